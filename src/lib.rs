@@ -1,0 +1,9 @@
+//! **trueup** reconciles a simulation with the actual: where a simulation and a real recording differ, it locates the
+//! mismatch, says what physics was left out, models it, and shows the fit improve on data it has not seen.
+//!
+//! One core ([`sim2real`]) serves two thin domains.
+
+#![deny(missing_docs)]
+#![forbid(unsafe_code)]
+
+pub mod sim2real;

@@ -1,0 +1,273 @@
+//! A plant and its mechanisms, put together and run.
+
+use std::fmt;
+use std::sync::Arc;
+
+use super::{
+    Candidate, Channel, Clock, Dynamics, Law, Mechanism, Observation, Parameter, Plant, Recording, Seed, Simulated,
+    Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+};
+
+/// The mechanisms a domain knows: one row each.
+pub type Registry<P> = &'static [&'static dyn Mechanism<P>];
+
+/// A mechanism in use: which one, in which form.
+struct Part<P: Plant> {
+    mechanism: &'static dyn Mechanism<P>,
+    form: usize,
+}
+
+impl<P: Plant> Clone for Part<P> {
+    fn clone(&self) -> Self {
+        Self { mechanism: self.mechanism, form: self.form }
+    }
+}
+
+/// A plant with its mechanisms: the simulator of a recording, the venue of a backtest, the joint of an environment.
+#[derive(Clone)]
+pub struct Assembly<P: Plant> {
+    plant: Arc<P>,
+    registry: Registry<P>,
+    parts: Vec<Part<P>>,
+    parameters: Vec<Parameter>,
+}
+
+impl<P: Plant> fmt::Debug for Assembly<P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Assembly").field("plant", &self.plant.name()).field("mechanisms", &self.modelled()).finish()
+    }
+}
+
+impl<P: Plant> Assembly<P> {
+    /// A plant with no mechanisms yet, which may be given those of `registry`.
+    #[must_use]
+    pub fn new(plant: P, registry: Registry<P>) -> Self {
+        Self { parameters: plant.parameters(), plant: Arc::new(plant), registry, parts: Vec::new() }
+    }
+
+    /// The plant.
+    #[must_use]
+    pub fn plant(&self) -> &P {
+        &self.plant
+    }
+
+    /// The mechanisms it may be given.
+    #[must_use]
+    pub fn registry(&self) -> Registry<P> {
+        self.registry
+    }
+
+    /// Adds a mechanism in one of its forms, with the values its parameters have today.
+    #[must_use]
+    pub fn with_mechanism(mut self, mechanism: &'static dyn Mechanism<P>, form: usize, parameters: Vec<Parameter>) -> Self {
+        self.parts.push(Part { mechanism, form });
+        self.parameters.extend(parameters);
+        self
+    }
+
+    /// The same assembly with other values of its parameters, in their order.
+    #[must_use]
+    pub fn with_values(mut self, values: &[f64]) -> Self {
+        for (parameter, value) in self.parameters.iter_mut().zip(values) {
+            parameter.nominal = *value;
+        }
+        self
+    }
+
+    /// A run over the lanes of `thetas`, from the states `initial` describes.
+    #[must_use]
+    pub fn run(&self, thetas: &Thetas, initial: &Thetas, seed: Seed) -> Run<P> {
+        let lanes = thetas.lanes();
+        let dynamics = self.plant.dynamics(&thetas.block(0, self.plant.parameters().len()));
+        let mut run = Run {
+            states: dynamics.initial(initial),
+            dynamics,
+            command_laws: Vec::new(),
+            plant_laws: Vec::new(),
+            observation_laws: Vec::new(),
+            effects: vec![P::Effect::default(); lanes],
+            commands: Vec::with_capacity(lanes),
+            inputs: Vec::with_capacity(lanes),
+            observations: vec![P::Observation::default(); lanes],
+        };
+        let mut at = self.plant.parameters().len();
+        for part in &self.parts {
+            let about = part.mechanism.about();
+            let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
+            let law = part.mechanism.law(part.form, &thetas.block(at, count), seed.child(about.name));
+            match about.site {
+                Site::Command => run.command_laws.push(law),
+                Site::Plant => run.plant_laws.push(law),
+                Site::Observation => run.observation_laws.push(law),
+            }
+            at += count;
+        }
+        run
+    }
+}
+
+/// A running assembly: all lanes, one step at a time.
+pub struct Run<P: Plant> {
+    dynamics: P::Dynamics,
+    command_laws: Vec<Box<dyn Law<P>>>,
+    plant_laws: Vec<Box<dyn Law<P>>>,
+    observation_laws: Vec<Box<dyn Law<P>>>,
+    states: Vec<P::State>,
+    effects: Vec<P::Effect>,
+    commands: Vec<P::Command>,
+    inputs: Vec<P::Input>,
+    observations: Vec<P::Observation>,
+}
+
+impl<P: Plant> fmt::Debug for Run<P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Run").field("lanes", &self.states.len()).finish_non_exhaustive()
+    }
+}
+
+impl<P: Plant> Run<P> {
+    /// Sends one command to every lane and gives it as it arrives, one a lane.
+    pub fn send(&mut self, tick: Tick, command: &P::Command) -> &mut [P::Command] {
+        self.commands.clear();
+        self.commands.resize(self.states.len(), command.clone());
+        for law in &mut self.command_laws {
+            law.shape(tick, &mut self.commands);
+        }
+        &mut self.commands
+    }
+
+    /// Lets the commands last sent act on the plant, which meets `input` of each lane's command.
+    pub fn advance(&mut self, tick: Tick, input: impl Fn(&P::Command) -> P::Input) {
+        self.inputs.clear();
+        self.inputs.extend(self.commands.iter().map(input));
+        self.effects.fill(P::Effect::default());
+        for law in &mut self.plant_laws {
+            law.act(tick, &self.states, &self.inputs, &self.commands, &mut self.effects);
+        }
+        self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
+    }
+
+    /// What is reported of every lane at `time` [s].
+    pub fn observe(&mut self, time: f64) -> &[P::Observation] {
+        self.dynamics.observe(&self.states, &mut self.observations);
+        for law in &mut self.observation_laws {
+            law.sense(time, &mut self.observations);
+        }
+        &self.observations
+    }
+
+    /// The states, one a lane.
+    #[must_use]
+    pub fn states(&self) -> &[P::State] {
+        &self.states
+    }
+}
+
+impl<P: Plant> Simulator for Assembly<P> {
+    type Stimulus = P::Stimulus;
+
+    fn name(&self) -> String {
+        self.plant.name().to_owned()
+    }
+
+    fn channels(&self) -> &[Channel] {
+        self.plant.channels()
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn initial_parameters(&self, recording: &Recording<P::Stimulus>) -> Vec<Parameter> {
+        self.plant.initial_parameters(recording)
+    }
+
+    fn rollout(&self, thetas: &Thetas, recording: &Recording<P::Stimulus>, rows: usize, seed: Seed) -> Vec<Trajectory> {
+        let own = self.parameters.len();
+        let mut run = self.run(&thetas.block(0, own), &thetas.block(own, thetas.parameters() - own), seed);
+        let mut out = Follow::new(self.channels(), thetas.lanes(), rows);
+        let mut index = 0;
+        for row in 0..rows {
+            let time = recording.time[row];
+            let command = recording.stimulus.command(row);
+            let interval = recording.time.get(row + 1).map_or(0.0, |next| next - time);
+            if let Clock::Sampled { .. } = self.plant.clock() {
+                out.record(run.observe(time));
+            }
+            if row + 1 == rows && self.plant.clock() != Clock::Event {
+                break;
+            }
+            let substeps = self.plant.clock().substeps(interval);
+            let step = interval / substeps as f64;
+            for sub in 0..substeps {
+                let tick = Tick { index, time: time + sub as f64 * step, step };
+                run.send(tick, &command);
+                run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
+                index += 1;
+            }
+            if self.plant.clock() == Clock::Event {
+                out.record(run.observe(time));
+            }
+        }
+        out.trajectories
+    }
+}
+
+/// Collects observations, lane by lane and channel by channel.
+struct Follow {
+    trajectories: Vec<Trajectory>,
+}
+
+impl Follow {
+    fn new(channels: &[Channel], lanes: usize, rows: usize) -> Self {
+        let one: Trajectory =
+            channels.iter().map(|c| Simulated { channel: c.name.to_owned(), samples: Vec::with_capacity(rows) }).collect();
+        // A clone of an empty vector has no capacity: reserve in each lane.
+        let mut trajectories = vec![one; lanes];
+        trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
+        Self { trajectories }
+    }
+
+    fn record<O: Observation>(&mut self, observations: &[O]) {
+        for (trajectory, observation) in self.trajectories.iter_mut().zip(observations) {
+            for (k, simulated) in trajectory.iter_mut().enumerate() {
+                simulated.samples.push(observation.channel(k));
+            }
+        }
+    }
+}
+
+impl<P: Plant> Twin for Assembly<P> {
+    fn candidates(&self, recordings: &[Recording<P::Stimulus>]) -> Vec<Candidate> {
+        let typical = self.plant.typical(recordings);
+        let modelled = self.modelled();
+        let mut candidates = Vec::new();
+        for mechanism in self.registry {
+            let about = mechanism.about();
+            if modelled.contains(&about.name) {
+                continue;
+            }
+            for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {
+                if recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus)) {
+                    candidates.push(Candidate { about, form, form_index });
+                }
+            }
+        }
+        candidates
+    }
+
+    fn with(&self, candidate: &Candidate) -> Self {
+        let row = self.registry.iter().find(|m| m.about().name == candidate.about.name);
+        match row {
+            Some(mechanism) => {
+                self.clone().with_mechanism(*mechanism, candidate.form_index, candidate.form.parameters.clone())
+            }
+            // A candidate of another registry has nothing to act on here.
+            None => self.clone(),
+        }
+    }
+
+    fn modelled(&self) -> Vec<&'static str> {
+        self.parts.iter().map(|p| p.mechanism.about().name).collect()
+    }
+}

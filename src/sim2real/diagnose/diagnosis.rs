@@ -1,0 +1,212 @@
+//! What a diagnosis says, in the form `diagnosis.json` has.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::sim2real::Site;
+
+/// The schema `diagnosis.json` names.
+pub const SCHEMA: &str = "trueup.diagnosis/1";
+
+/// The answer, in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The missing mechanisms are named, and the trued twin explains data it has not seen.
+    Named,
+    /// Something is missing, but these data do not tell which of the listed mechanisms it is.
+    Ambiguous,
+    /// The twin explains the recordings, at most after its own parameters are refitted.
+    NoMismatch,
+    /// Something is missing that none of the known mechanisms explains.
+    Unexplained,
+    /// The recordings do not move the system enough to tell.
+    NotExcited,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Named => "named",
+            Self::Ambiguous => "ambiguous",
+            Self::NoMismatch => "no_mismatch",
+            Self::Unexplained => "unexplained",
+            Self::NotExcited => "not_excited",
+        })
+    }
+}
+
+/// The whole result. Field by field it is `diagnosis.json`; `scores` and `modelled` are additions to its schema.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// The answer, in one word.
+    pub verdict: Verdict,
+    /// The answer, in one sentence a person can act on.
+    pub summary: String,
+    /// What was found, most certain first.
+    pub effects: Vec<Effect>,
+    /// Where model and recording part, before anything is named.
+    #[serde(rename = "where")]
+    pub location: Where,
+    /// The twin's own parameters, refitted together with what was found.
+    pub parameters: BTreeMap<String, ParameterChange>,
+    /// Errors per channel, all on held-out data.
+    pub fit: Vec<ChannelFit>,
+    /// What speaks for and against the answer.
+    pub checks: Checks,
+    /// What to record next, where these data cannot tell.
+    pub next_experiment: Option<NextExperiment>,
+    /// How each mechanism that was tried did, best first.
+    pub scores: Vec<Score>,
+    /// What the twin already modelled.
+    pub modelled: Vec<String>,
+    /// How the held-out data were chosen, in words.
+    pub held_out: String,
+}
+
+/// A mechanism that was found to be missing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Effect {
+    /// Its id.
+    pub mechanism: String,
+    /// Where it acts.
+    pub site: Site,
+    /// Probability that the name is right, from 0 to 1.
+    pub confidence: f64,
+    /// Its fitted parameters.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// What else it might be.
+    pub rivals: Vec<Rival>,
+    /// When it acted, in words.
+    #[serde(rename = "where")]
+    pub location: Option<String>,
+}
+
+/// A fitted value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The value, in `unit`.
+    pub value: f64,
+    /// Its standard deviation, in `unit`.
+    pub std: f64,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// A mechanism that explains the data nearly as well as the one named.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rival {
+    /// Its id.
+    pub mechanism: String,
+    /// Probability that it is the right name instead.
+    pub confidence: f64,
+}
+
+/// Where the recalibrated twin and the recording part.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Where {
+    /// The worst stretches of time, worst first.
+    pub intervals: Vec<Interval>,
+    /// When it began [s], where it did not from the start.
+    pub onset: Option<f64>,
+}
+
+/// A stretch of time in which a channel's error is large.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// The channel.
+    pub channel: String,
+    /// Start [s].
+    pub start: f64,
+    /// End [s].
+    pub end: f64,
+    /// The part of the channel's squared error that lies within, from 0 to 1.
+    pub share_of_error: f64,
+    /// The recording it lies in.
+    pub recording: String,
+}
+
+/// A parameter of the twin, before and after.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterChange {
+    /// What the twin says today.
+    pub nominal: f64,
+    /// What the recordings say.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// Errors of one channel on held-out data, in the channel's unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChannelFit {
+    /// The channel.
+    pub channel: String,
+    /// Its unit, and that of all errors.
+    pub unit: String,
+    /// Standard deviation of the measurement noise.
+    pub noise_floor: f64,
+    /// Root mean square error of the twin as given.
+    pub nominal_rmse: f64,
+    /// Of the twin with its own parameters refitted.
+    pub recalibrated_rmse: f64,
+    /// Of the twin with what was found added.
+    pub trued_rmse: f64,
+    /// Mean absolute error of the twin as given.
+    pub nominal_mae: f64,
+    /// Mean absolute error of the twin with its own parameters refitted.
+    pub recalibrated_mae: f64,
+    /// Mean absolute error of the twin with what was found added.
+    pub trued_mae: f64,
+    /// By what part the trued twin's RMSE lies below the recalibrated twin's: 95 % interval, block bootstrap.
+    pub improvement_ci95: [f64; 2],
+}
+
+/// What speaks for and against a verdict.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Checks {
+    /// Mean over 40 lags of `N rho^2` of the trued residual: about 1 when the physics is complete.
+    pub adequacy: f64,
+    /// The part of the recalibrated misfit above the noise floor that is left.
+    pub remainder: f64,
+    /// Share of placebos that did at least as well as what was named; none where nothing was named.
+    pub placebo_p: Option<f64>,
+    /// Parameters that ended at a bound.
+    pub at_bound: Vec<String>,
+    /// How many mechanisms were tried.
+    pub tried: usize,
+    /// Further findings a reader should know, in words.
+    pub notes: Vec<String>,
+}
+
+/// What to record next.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NextExperiment {
+    /// What to do, in one sentence.
+    pub what: String,
+}
+
+/// How one mechanism did in the stage in which it was tried.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// Its id.
+    pub mechanism: String,
+    /// Which of its forms, where there are several.
+    pub form: String,
+    /// Number of mechanisms already accepted when it was tried.
+    pub stage: usize,
+    /// Correlation of its projected signature with the residual, from 0 to 1.
+    pub screen: f64,
+    /// The part of its signature that refitting the other parameters could not hide, from 0 to 1.
+    pub survival: f64,
+    /// `N_e ln(RSS0 / RSS1) - k ln N_e`; none where it was screened out.
+    pub gain: Option<f64>,
+    /// Whether it was accepted in that stage.
+    pub accepted: bool,
+}

@@ -1,0 +1,7 @@
+//! Locate, name, model, prove: what a simulator left out, found from recordings.
+
+mod diagnosis;
+
+pub use diagnosis::{
+    Checks, ChannelFit, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Score, Verdict, Where,
+};

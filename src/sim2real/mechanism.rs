@@ -1,0 +1,112 @@
+//! The noun that carries the project: a piece of physics that may be missing from a simulator.
+//!
+//! A mechanism is written once, in a file of its own, and listed once, in its domain's registry. Those that act on
+//! commands or observations of any plant live here; those of a plant live with it.
+
+mod actuator_lag;
+mod bias;
+mod command_delay;
+mod dead_zone;
+mod saturation;
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Parameter, Plant, Seed, Thetas, Tick, Typical};
+
+pub use actuator_lag::ActuatorLag;
+pub use bias::Bias;
+pub use command_delay::{CommandDelay, HeldLine};
+pub use dead_zone::DeadZone;
+pub use saturation::Saturation;
+
+/// Where a mechanism acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Site {
+    /// On what is sent, on its way to the plant.
+    Command,
+    /// Inside the plant.
+    Plant,
+    /// On what is reported, on its way back.
+    Observation,
+}
+
+impl fmt::Display for Site {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Command => "command",
+            Self::Plant => "plant",
+            Self::Observation => "observation",
+        })
+    }
+}
+
+/// One way to state a mechanism: a law and the parameters it has.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Form {
+    /// What tells this form from the others of its mechanism ("bps"); empty where there is one only.
+    pub name: &'static str,
+    /// Its parameters; their nominal values do nothing.
+    pub parameters: Vec<Parameter>,
+}
+
+impl Form {
+    /// The only form of a mechanism.
+    #[must_use]
+    pub fn only(parameters: Vec<Parameter>) -> Vec<Self> {
+        vec![Self { name: "", parameters }]
+    }
+}
+
+/// What the documentation, the command line and reports say of a mechanism.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct About {
+    /// Id, as in a twin.
+    pub name: &'static str,
+    /// Where it acts.
+    pub site: Site,
+    /// What a report calls it, within a sentence ("Coulomb friction").
+    pub title: &'static str,
+    /// The law, in one line.
+    pub law: &'static str,
+    /// Where the law comes from.
+    pub source: &'static str,
+    /// What a person who reads that it is missing may do about it.
+    pub remedy: &'static str,
+    /// Ids of simpler mechanisms it contains as special cases.
+    pub contains: &'static [&'static str],
+}
+
+/// A piece of physics: a stateless description, from which the running [`Law`] is made.
+///
+/// # Contract
+/// - At the nominal values of its parameters it changes no bit of the output.
+/// - At each start it changes something, on a plant that is moved enough.
+/// - Its law acts at its site only, and a lane's result never depends on the lanes beside it.
+///
+/// [`check_mechanism`](super::check_mechanism) runs it.
+pub trait Mechanism<P: Plant>: Send + Sync {
+    /// Its id, site, law and source.
+    fn about(&self) -> About;
+    /// Its forms, the plainest first, with starts that suit what is `typical` of the recording.
+    fn forms(&self, typical: &Typical) -> Vec<Form>;
+    /// Whether a form could act at all on the given plant and what drives it: a fraction of a quoted spread needs
+    /// quotes.
+    fn applies(&self, _form: usize, _plant: &P, _stimulus: &P::Stimulus) -> bool {
+        true
+    }
+    /// The running part of form `form` over the lanes of `thetas`, which holds that form's parameters and no others.
+    fn law(&self, form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<P>>;
+}
+
+/// The running part of a mechanism over all lanes, and the owner of its memory. It acts through one of its methods.
+pub trait Law<P: Plant>: Send {
+    /// Shapes the commands on their way to the plant, one a lane.
+    fn shape(&mut self, _tick: Tick, _commands: &mut [P::Command]) {}
+    /// Adds to what acts inside the plant, one effect a lane.
+    fn act(&mut self, _tick: Tick, _states: &[P::State], _inputs: &[P::Input], _commands: &[P::Command], _effects: &mut [P::Effect]) {}
+    /// Distorts the observations on their way back, one a lane.
+    fn sense(&mut self, _time: f64, _observations: &mut [P::Observation]) {}
+}

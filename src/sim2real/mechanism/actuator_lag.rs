@@ -1,0 +1,80 @@
+//! An actuator that follows its command with a first-order lag.
+
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+
+/// `time_constant du/dt = u_command - u`.
+///
+/// Solved exactly over each tick for a command that holds; what the plant gets is the mean over the tick.
+///
+/// Source: first-order actuator, Åström & Murray, *Feedback Systems* (2nd ed. 2021), section 3.3.
+#[derive(Debug, Clone, Copy)]
+pub struct ActuatorLag;
+
+impl<P: Plant> Mechanism<P> for ActuatorLag
+where
+    P::Command: AsMut<f64>,
+{
+    fn about(&self) -> About {
+        About {
+            name: "actuator_lag",
+            site: Site::Command,
+            title: "a first-order lag of the actuator",
+            law: "time_constant du/dt = u_command - u",
+            source: "Åström & Murray, Feedback Systems (2021), 3.3",
+            remedy: "measure the actuator's step response; add the lag to the simulator",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, _typical: &Typical) -> Vec<Form> {
+        Form::only(vec![Parameter::new("time_constant", "s", 0.0).within(0.0, 2.0).starting_at(&[0.01, 0.05])])
+    }
+
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        Box::new(Lag { time_constant: thetas.row(0).to_vec(), follower: vec![None; thetas.lanes()], decay: Decay::default() })
+    }
+}
+
+struct Lag {
+    time_constant: Vec<f64>,
+    /// What the actuator gives at the start of the tick; none before the first command, which it has already reached.
+    follower: Vec<Option<f64>>,
+    decay: Decay,
+}
+
+/// `1 - exp(-step / time_constant)` over lanes, kept while the step stays the same: an exponential costs more than
+/// all the rest of the law.
+#[derive(Default)]
+struct Decay {
+    step: f64,
+    gained: Vec<f64>,
+}
+
+impl Decay {
+    fn over(&mut self, step: f64, time_constant: &[f64]) -> &[f64] {
+        if self.gained.is_empty() || self.step.to_bits() != step.to_bits() {
+            self.step = step;
+            self.gained = time_constant.iter().map(|tau| if *tau > 0.0 { -(-step / tau).exp_m1() } else { 1.0 }).collect();
+        }
+        &self.gained
+    }
+}
+
+impl<P: Plant> Law<P> for Lag
+where
+    P::Command: AsMut<f64>,
+{
+    fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
+        let gained = self.decay.over(tick.step, &self.time_constant);
+        let lanes = commands.iter_mut().zip(&self.time_constant).zip(&mut self.follower).zip(gained);
+        for (((command, tau), follower), gained) in lanes {
+            let u = command.as_mut();
+            let start = follower.unwrap_or(*u);
+            let end = start + (*u - start) * gained;
+            *follower = Some(end);
+            if *tau > 0.0 && tick.step > 0.0 {
+                *u += (start - *u) * gained * tau / tick.step;
+            }
+        }
+    }
+}

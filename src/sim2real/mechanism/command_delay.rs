@@ -1,0 +1,127 @@
+//! Dead time on the way to the plant: bus, driver and scheduler latency of a servo, order latency of a market.
+
+use std::collections::VecDeque;
+
+use crate::sim2real::{About, Command, DelayLine, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+
+/// `u(t) -> u(t - seconds)`; an order arrives `seconds` after it was sent.
+///
+/// Source: dead time in a loop, Åström & Murray, *Feedback Systems* (2nd ed. 2021), section 9.2; order latency as
+/// simulated time, Moallemi & Sağlam, "The cost of latency", Operations Research 61 (2013).
+#[derive(Debug, Clone, Copy)]
+pub struct CommandDelay {
+    /// The delay's parameter, as its domain bounds it [s].
+    pub longest: f64,
+    /// Where fits begin [s].
+    pub starts: &'static [f64],
+    /// Whether the output is differentiable in the delay.
+    pub smooth: bool,
+}
+
+impl<P: Plant> Mechanism<P> for CommandDelay {
+    fn about(&self) -> About {
+        About {
+            name: "command_delay",
+            site: Site::Command,
+            title: "a delay of the command",
+            law: "u(t) -> u(t - seconds)",
+            source: "Åström & Murray, Feedback Systems (2021), 9.2; Moallemi & Sağlam, Operations Research 61 (2013)",
+            remedy: "stamp commands when sent and when they take effect; add the delay to the simulator",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, _typical: &Typical) -> Vec<Form> {
+        let mut seconds = Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(self.starts);
+        seconds.smooth = self.smooth;
+        Form::only(vec![seconds])
+    }
+
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let seconds = thetas.row(0).to_vec();
+        Box::new(Delay::<P> { lines: vec![Default::default(); seconds.len()], seconds })
+    }
+}
+
+struct Delay<P: Plant> {
+    seconds: Vec<f64>,
+    lines: Vec<<P::Command as Command>::Line>,
+}
+
+impl<P: Plant> Law<P> for Delay<P> {
+    fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
+        for ((command, line), seconds) in commands.iter_mut().zip(&mut self.lines).zip(&self.seconds) {
+            line.pass(tick, *seconds, command);
+        }
+    }
+}
+
+/// The past of a signal that holds its value until the next.
+///
+/// What leaves the line during a tick is the mean of the delayed signal over that tick, which is continuous in the
+/// delay, so that a delay is fitted with derivatives although the signal steps.
+#[derive(Debug, Clone, Default)]
+pub struct HeldLine {
+    /// Change points (time [s], value from then on), oldest first.
+    past: VecDeque<(f64, f64)>,
+}
+
+impl HeldLine {
+    /// Mean over `[start, start + step)` of the signal `seconds` [s] ago, after `value` has been held from `start` on.
+    pub fn mean(&mut self, tick: Tick, seconds: f64, value: f64) -> f64 {
+        // Before its first change a signal is taken to have held the value it has at first.
+        if self.past.back().is_none_or(|(_, held)| *held != value) {
+            self.past.push_back((tick.time, value));
+        }
+        let from = tick.time - seconds;
+        while self.past.get(1).is_some_and(|(time, _)| *time <= from) {
+            self.past.pop_front();
+        }
+        let first = self.past.front().map_or(value, |(_, v)| *v);
+        if tick.step <= 0.0 || self.past.get(1).is_none_or(|(time, _)| *time >= from + tick.step) {
+            return first;
+        }
+        let mut area = 0.0;
+        let (mut since, mut held) = (from, first);
+        for (time, next) in self.past.iter().skip(1).take_while(|(time, _)| *time < from + tick.step) {
+            area += held * (time - since);
+            (since, held) = (*time, *next);
+        }
+        (area + held * (from + tick.step - since)) / tick.step
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tick(index: usize, step: f64) -> Tick {
+        Tick { index, time: index as f64 * step, step }
+    }
+
+    #[test]
+    fn a_step_arrives_late_and_split_over_the_tick_it_falls_into() {
+        let mut line = HeldLine::default();
+        let out: Vec<f64> = (0..6).map(|i| line.mean(tick(i, 1.0), 1.75, if i == 0 { 0.0 } else { 1.0 })).collect();
+        // The step of t = 1 s arrives at 2.75 s: a quarter of the tick from 2 s on has it.
+        assert_eq!(out, [0.0, 0.0, 0.25, 1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn no_delay_changes_no_bit() {
+        let mut line = HeldLine::default();
+        for i in 0..100 {
+            let value = (i as f64 * 0.7).sin();
+            assert_eq!(line.mean(tick(i, 0.001), 0.0, value), value);
+        }
+    }
+
+    #[test]
+    fn the_line_forgets_what_has_left_it() {
+        let mut line = HeldLine::default();
+        for i in 0..10_000 {
+            line.mean(tick(i, 0.001), 0.01, i as f64);
+        }
+        assert!(line.past.len() < 20);
+    }
+}

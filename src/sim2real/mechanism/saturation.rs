@@ -1,0 +1,52 @@
+//! A command larger than the actuator can give.
+
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+
+/// `u -> min(max(u, -limit), limit)`.
+///
+/// Source: Tarbouriech et al., *Stability and Stabilization of Linear Systems with Saturating Actuators* (2011),
+/// chapter 1.
+#[derive(Debug, Clone, Copy)]
+pub struct Saturation;
+
+impl<P: Plant> Mechanism<P> for Saturation
+where
+    P::Command: AsMut<f64>,
+{
+    fn about(&self) -> About {
+        About {
+            name: "saturation",
+            site: Site::Command,
+            title: "saturation of the actuator",
+            law: "u -> min(max(u, -limit), limit)",
+            source: "Tarbouriech et al., Stability and Stabilization of Linear Systems with Saturating Actuators (2011)",
+            remedy: "keep commands within the limit, or clip them in the simulator as the actuator does",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let starts = [1.6, 1.2, 0.8, 0.5].map(|fraction| fraction * typical.command);
+        Form::only(vec![
+            Parameter::new("limit", "command", f64::INFINITY).within(0.0, f64::INFINITY).starting_at(&starts),
+        ])
+    }
+
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        Box::new(Limit(thetas.row(0).to_vec()))
+    }
+}
+
+struct Limit(Vec<f64>);
+
+impl<P: Plant> Law<P> for Limit
+where
+    P::Command: AsMut<f64>,
+{
+    fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
+        for (command, limit) in commands.iter_mut().zip(&self.0) {
+            let u = command.as_mut();
+            *u = u.max(-limit).min(*limit);
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! The core: what a simulator and a recording have to do with each other, whatever they are of. It knows no joint and
+//! no order.
+//!
+//! ```text
+//! Recording -> identify -> diagnose (where, name, model, prove) -> Diagnosis -> trued twin
+//! ```
+
+mod assembly;
+mod check;
+pub mod diagnose;
+pub mod identify;
+pub mod mechanism;
+mod parameter;
+mod plant;
+mod recording;
+mod residual;
+mod seed;
+mod simulator;
+mod time;
+
+pub use assembly::{Assembly, Registry, Run};
+pub use check::{Violation, check_mechanism, check_plant};
+pub use mechanism::{About, Form, Law, Mechanism, Site};
+pub use parameter::{Parameter, Thetas};
+pub use plant::{Channel, Clock, Command, DelayLine, Dynamics, Observation, Plant, Stimulus, Typical};
+pub use recording::{Measured, Part, Recording, Simulated, Trajectory};
+pub use residual::{ChannelWeight, Residual};
+pub use seed::Seed;
+pub use simulator::{Candidate, Simulator, Twin};
+pub use time::{Tick, Timestamp};

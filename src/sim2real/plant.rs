@@ -1,0 +1,131 @@
+//! Known physics, with a place for what is not known.
+
+use super::{Parameter, Recording, Thetas, Tick};
+
+/// What makes a plant's clock tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Clock {
+    /// Rows are samples of a signal; steps of integration are at most this long [s].
+    Sampled {
+        /// Longest step of integration [s].
+        longest_step: f64,
+    },
+    /// Rows are messages, each answered by one observation.
+    Event,
+}
+
+impl Clock {
+    /// In how many steps an interval of `seconds` [s] is integrated; at least one.
+    #[must_use]
+    pub fn substeps(self, seconds: f64) -> usize {
+        match self {
+            // The small allowance keeps a row of exactly one step, up to rounding, from being cut in two.
+            Self::Sampled { longest_step } => ((seconds / longest_step - 1e-6).ceil() as usize).max(1),
+            Self::Event => 1,
+        }
+    }
+}
+
+/// What is sent to a plant.
+pub trait Command: Clone + Send + Sync + 'static {
+    /// How a delay acts on it: a signal that holds needs a line of its past, a message only a later arrival.
+    type Line: DelayLine<Self>;
+}
+
+/// The memory of a delay, for one lane.
+pub trait DelayLine<C>: Clone + Default + Send {
+    /// Replaces `command`, sent during `tick`, by what arrives then through a delay of `seconds` [s].
+    fn pass(&mut self, tick: Tick, seconds: f64, command: &mut C);
+}
+
+/// What a plant lets one see: a row of channels.
+pub trait Observation: Clone + Default + Send + 'static {
+    /// Value of channel `k`, in the order of [`Plant::channels`].
+    fn channel(&self, k: usize) -> f64;
+}
+
+/// What drives a plant while a recording is followed.
+pub trait Stimulus<P: Plant>: Send + Sync {
+    /// The command of row `row`, in force from its time on.
+    fn command(&self, row: usize) -> P::Command;
+    /// What the plant meets in row `row`, given the command as it arrives.
+    fn input(&self, row: usize, arriving: &P::Command) -> P::Input;
+}
+
+/// A channel a plant can be observed through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Channel {
+    /// Name, as written in a twin and a recording.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+}
+
+/// Known physics: a stateless description, from which [`Dynamics`] are made for the lanes of a run.
+///
+/// # Contract
+/// - A lane's result never depends on how many lanes run beside it.
+/// - Same parameters, commands and effects, same bits.
+/// - An effect's default does nothing.
+///
+/// [`check_plant`](super::check_plant) runs it.
+pub trait Plant: Send + Sync + Sized + Clone + 'static {
+    /// What is sent to it.
+    type Command: Command;
+    /// What else it meets: nothing, or the book an order finds.
+    type Input: Clone + Send + Sync;
+    /// What it remembers.
+    type State: Clone + Send;
+    /// Where missing physics acts on it; the default does nothing.
+    type Effect: Default + Clone + Send;
+    /// What can be seen of it.
+    type Observation: Observation;
+    /// Its running part.
+    type Dynamics: Dynamics<Self>;
+    /// What drives it while a recording is followed.
+    type Stimulus: Stimulus<Self> + Send + Sync;
+
+    /// Name, as a twin's `model`.
+    fn name(&self) -> &'static str;
+    /// What makes its clock tick.
+    fn clock(&self) -> Clock;
+    /// The channels it can be observed through, in the order of [`Observation::channel`].
+    fn channels(&self) -> &'static [Channel];
+    /// Its parameters, with the values it has today.
+    fn parameters(&self) -> Vec<Parameter>;
+    /// Typical sizes of what drives it and what is seen of it in `recordings`, by which fits choose where to begin.
+    fn typical(&self, recordings: &[Recording<Self::Stimulus>]) -> Typical;
+    /// The parameters of its initial state in `recording`, with values estimated from the first rows.
+    fn initial_parameters(&self, recording: &Recording<Self::Stimulus>) -> Vec<Parameter>;
+    /// The running part, one lane a point of `thetas` (in the order of [`Plant::parameters`]).
+    fn dynamics(&self, thetas: &Thetas) -> Self::Dynamics;
+}
+
+/// The running part of a plant over all lanes; it owns the lanes' parameters, not their states.
+pub trait Dynamics<P: Plant>: Send {
+    /// The states at the start; `initial` is in the order of [`Plant::initial_parameters`].
+    fn initial(&self, initial: &Thetas) -> Vec<P::State>;
+    /// Advances every lane by one tick. All slices have one entry a lane.
+    fn advance(&self, tick: Tick, states: &mut [P::State], inputs: &[P::Input], commands: &[P::Command], effects: &[P::Effect]);
+    /// What is seen of every lane.
+    fn observe(&self, states: &[P::State], observations: &mut [P::Observation]);
+}
+
+/// Typical sizes in a recording: fits begin at fractions of these.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Typical {
+    /// Of the command, in its unit.
+    pub command: f64,
+    /// Of what the command does to the plant (a torque [N m]; for orders a cost [bps]).
+    pub effort: f64,
+    /// Of the first channel's excursions, in its unit.
+    pub output: f64,
+    /// Of the first channel's rate of change [its unit/s].
+    pub rate: f64,
+}
+
+impl Default for Typical {
+    fn default() -> Self {
+        Self { command: 1.0, effort: 1.0, output: 1.0, rate: 1.0 }
+    }
+}

@@ -1,0 +1,49 @@
+//! All that identification, diagnosis and reports see of a simulator.
+
+use super::{About, Channel, Form, Parameter, Recording, Seed, Thetas, Trajectory};
+
+/// Something that follows a recording and says what it would have measured.
+///
+/// An [`Assembly`](super::Assembly) of a plant and its mechanisms is one; a simulator written elsewhere needs only
+/// these methods to be identified.
+///
+/// # Contract
+/// [`Simulator::rollout`] gives one trajectory a lane, each with every channel of [`Simulator::channels`] and one
+/// sample a row; a lane's bits depend on neither the lanes beside it nor the thread.
+pub trait Simulator: Send + Sync {
+    /// What drives it.
+    type Stimulus: Send + Sync;
+    /// Name.
+    fn name(&self) -> String;
+    /// The channels it simulates.
+    fn channels(&self) -> &[Channel];
+    /// Its parameters: the plant's, then those of each mechanism in turn.
+    fn parameters(&self) -> &[Parameter];
+    /// Parameters of the initial state in `recording`: they belong to the recording and are fitted beside it.
+    fn initial_parameters(&self, recording: &Recording<Self::Stimulus>) -> Vec<Parameter>;
+    /// Follows the first `rows` rows of `recording` over all lanes of `thetas`: [`Simulator::parameters`] first, then
+    /// [`Simulator::initial_parameters`].
+    fn rollout(&self, thetas: &Thetas, recording: &Recording<Self::Stimulus>, rows: usize, seed: Seed) -> Vec<Trajectory>;
+}
+
+/// A mechanism a twin could be given: what diagnosis needs to know of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its id, site and law.
+    pub about: About,
+    /// Which of its forms.
+    pub form: Form,
+    /// Number of that form.
+    pub form_index: usize,
+}
+
+/// A simulator that can be given mechanisms it lacks.
+pub trait Twin: Simulator + Clone {
+    /// The forms of all mechanisms it could be given and does not model yet, as far as `recordings` can tell of them.
+    fn candidates(&self, recordings: &[Recording<Self::Stimulus>]) -> Vec<Candidate>;
+    /// The twin with one more mechanism, whose parameters follow those it has.
+    #[must_use]
+    fn with(&self, candidate: &Candidate) -> Self;
+    /// Ids of the mechanisms it models.
+    fn modelled(&self) -> Vec<&'static str>;
+}
