@@ -118,7 +118,10 @@ fn lanes_are_independent<P: Plant>(
     let beside = follow(assembly, recording, &[other.clone(), lane.to_vec(), other.clone(), other, lane.to_vec()]);
     for k in [1, 4] {
         if beside[k] != alone[0] {
-            return Err(Violation { subject: subject.to_owned(), what: format!("lane {k} of 5 differs from the same lane alone") });
+            return Err(Violation {
+                subject: subject.to_owned(),
+                what: format!("lane {k} of 5 differs from the same lane alone"),
+            });
         }
     }
     Ok(())
@@ -126,7 +129,8 @@ fn lanes_are_independent<P: Plant>(
 
 fn check_parameters(subject: &str, parameters: &[Parameter]) -> Result<(), Violation> {
     for p in parameters {
-        let fail = |what: &str| Err(Violation { subject: subject.to_owned(), what: format!("parameter `{}` {what}", p.name) });
+        let fail =
+            |what: &str| Err(Violation { subject: subject.to_owned(), what: format!("parameter `{}` {what}", p.name) });
         if p.lower > p.upper || !(p.lower..=p.upper).contains(&p.nominal) {
             return fail("has a nominal value outside its bounds");
         }

@@ -106,7 +106,15 @@ pub trait Law<P: Plant>: Send {
     /// Shapes the commands on their way to the plant, one a lane.
     fn shape(&mut self, _tick: Tick, _commands: &mut [P::Command]) {}
     /// Adds to what acts inside the plant, one effect a lane.
-    fn act(&mut self, _tick: Tick, _states: &[P::State], _inputs: &[P::Input], _commands: &[P::Command], _effects: &mut [P::Effect]) {}
+    fn act(
+        &mut self,
+        _tick: Tick,
+        _states: &[P::State],
+        _inputs: &[P::Input],
+        _commands: &[P::Command],
+        _effects: &mut [P::Effect],
+    ) {
+    }
     /// Distorts the observations on their way back, one a lane.
     fn sense(&mut self, _time: f64, _observations: &mut [P::Observation]) {}
 }

@@ -106,7 +106,14 @@ pub trait Dynamics<P: Plant>: Send {
     /// The states at the start; `initial` is in the order of [`Plant::initial_parameters`].
     fn initial(&self, initial: &Thetas) -> Vec<P::State>;
     /// Advances every lane by one tick. All slices have one entry a lane.
-    fn advance(&self, tick: Tick, states: &mut [P::State], inputs: &[P::Input], commands: &[P::Command], effects: &[P::Effect]);
+    fn advance(
+        &self,
+        tick: Tick,
+        states: &mut [P::State],
+        inputs: &[P::Input],
+        commands: &[P::Command],
+        effects: &[P::Effect],
+    );
     /// What is seen of every lane.
     fn observe(&self, states: &[P::State], observations: &mut [P::Observation]);
 }

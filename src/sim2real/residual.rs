@@ -33,7 +33,12 @@ impl Residual {
 }
 
 /// The residuals of all weighted channels that `part` measures, in the order of `weights`.
-pub(crate) fn residuals<S>(part: &Part<'_, S>, number: usize, simulated: &Trajectory, weights: &[ChannelWeight]) -> Vec<Residual> {
+pub(crate) fn residuals<S>(
+    part: &Part<'_, S>,
+    number: usize,
+    simulated: &Trajectory,
+    weights: &[ChannelWeight],
+) -> Vec<Residual> {
     weights
         .iter()
         .filter_map(|weight| {

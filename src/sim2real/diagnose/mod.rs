@@ -3,5 +3,6 @@
 mod diagnosis;
 
 pub use diagnosis::{
-    Checks, ChannelFit, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Score, Verdict, Where,
+    ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Score,
+    Verdict, Where,
 };

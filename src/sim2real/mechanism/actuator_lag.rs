@@ -31,7 +31,11 @@ where
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Lag { time_constant: thetas.row(0).to_vec(), follower: vec![None; thetas.lanes()], decay: Decay::default() })
+        Box::new(Lag {
+            time_constant: thetas.row(0).to_vec(),
+            follower: vec![None; thetas.lanes()],
+            decay: Decay::default(),
+        })
     }
 }
 

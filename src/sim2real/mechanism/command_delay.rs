@@ -2,7 +2,9 @@
 
 use std::collections::VecDeque;
 
-use crate::sim2real::{About, Command, DelayLine, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{
+    About, Command, DelayLine, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical,
+};
 
 /// `u(t) -> u(t - seconds)`; an order arrives `seconds` after it was sent.
 ///

@@ -27,9 +27,7 @@ where
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [1.6, 1.2, 0.8, 0.5].map(|fraction| fraction * typical.command);
-        Form::only(vec![
-            Parameter::new("limit", "command", f64::INFINITY).within(0.0, f64::INFINITY).starting_at(&starts),
-        ])
+        Form::only(vec![Parameter::new("limit", "command", f64::INFINITY).within(0.0, f64::INFINITY).starting_at(&starts)])
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

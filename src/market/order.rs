@@ -1,0 +1,68 @@
+//! Orders on their way to the market.
+
+use crate::sim2real::{Command, DelayLine, Tick, Timestamp};
+
+/// Which way an order trades.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Side {
+    /// Takes from the asks.
+    Buy,
+    /// Takes from the bids.
+    Sell,
+}
+
+impl Side {
+    /// +1 for a buy, -1 for a sell.
+    #[must_use]
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Buy => 1.0,
+            Self::Sell => -1.0,
+        }
+    }
+}
+
+/// A market order between decision and fill: the command of the [execution](super::Execution) plant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InFlight {
+    /// Which way it trades.
+    pub side: Side,
+    /// How much of it is left to fill [units].
+    pub quantity: f64,
+    /// When it was decided.
+    pub decided_at: Timestamp,
+    /// When it meets the market.
+    pub arrives_at: Timestamp,
+    /// The price the twin assumes it fills at [currency].
+    pub assumed: f64,
+    /// The mid, or the nearest to it the data know, when it was decided [currency]: the unit of its costs in bps.
+    pub mid: f64,
+    /// The largest part of the volume it meets that it may take; infinite where nothing limits it.
+    pub participation_limit: f64,
+    /// Units traded on an average day, where known.
+    pub average_daily_volume: Option<f64>,
+    /// Standard deviation of the daily return (a fraction), where known.
+    pub daily_volatility: Option<f64>,
+}
+
+impl InFlight {
+    /// Part of an average day's volume it asks for; 0 where that volume is not known.
+    #[must_use]
+    pub fn participation(&self) -> f64 {
+        self.average_daily_volume.map_or(0.0, |volume| self.quantity / volume)
+    }
+}
+
+impl Command for InFlight {
+    type Line = Posted;
+}
+
+/// The delay of a message: it arrives later, and nothing else changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Posted;
+
+impl DelayLine<InFlight> for Posted {
+    fn pass(&mut self, _tick: Tick, seconds: f64, order: &mut InFlight) {
+        order.arrives_at = order.arrives_at.plus_seconds(seconds);
+    }
+}
