@@ -82,7 +82,7 @@ impl Plant for Execution {
         Typical::default()
     }
 
-    fn initial_parameters(&self, _recording: &Recording<OrderLog>) -> Vec<Parameter> {
+    fn initial_parameters(&self, _recording: &Recording<OrderLog>, _row: usize) -> Vec<Parameter> {
         Vec::new()
     }
 
