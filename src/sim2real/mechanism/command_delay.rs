@@ -33,8 +33,9 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
         }
     }
 
-    fn forms(&self, _typical: &Typical) -> Vec<Form> {
-        let mut seconds = Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(self.starts);
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let starts: Vec<f64> = typical.delay.iter().chain(self.starts).copied().collect();
+        let mut seconds = Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(&starts);
         seconds.smooth = self.smooth;
         Form::only(vec![seconds])
     }
