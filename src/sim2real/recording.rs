@@ -141,7 +141,7 @@ mod tests {
     fn a_split_is_in_time_not_in_rows() {
         let recording = recording();
         let (fit, held) = Part::split(&recording, 0.7);
-        assert_eq!((fit.rows, held.rows), (0..3, 3..4));
+        assert_eq!((fit.rows.clone(), held.rows.clone()), (0..3, 3..4));
         assert_eq!(Part::whole(&recording).rows, 0..4);
         assert_eq!(held.followed(), 0..4);
     }
