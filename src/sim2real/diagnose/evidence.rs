@@ -67,6 +67,11 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
         Self { free_run, compared, held_out: apart, how, weights, rounding, window }
     }
 
+    /// The initial states with which parts are compared: windows start wherever fits best.
+    pub(super) fn initial_state<T: Simulator<Stimulus = S>>(&self, problem: &Problem<'_, T>) -> State {
+        if self.window.is_some() { State::unknown(problem) } else { State::estimated(problem) }
+    }
+
     /// The state from which a simulator at `theta` best starts a held-out part: estimated from the rows before it where a
     /// run passes through them, from its first rows elsewhere.
     pub(super) fn settled<T: Simulator<Stimulus = S>>(&self, simulator: &T, theta: &[f64], part: &Part<'a, S>) -> Vec<f64> {

@@ -86,7 +86,7 @@ impl<T: Twin> Inquiry<'_, T> {
     /// The best fit of `twin` from several starts.
     fn fitted(&self, twin: T, added: Vec<usize>, starts: &[Vec<f64>], state: Option<&State>) -> Hypothesis<T> {
         let problem = self.problem(&twin, &self.evidence.compared);
-        let estimated = State::estimated(&problem);
+        let estimated = self.evidence.initial_state(&problem);
         let state = state.unwrap_or(&estimated);
         let free = free_parameters(&twin);
         let fits: Vec<Fit> = starts.par_iter().map(|start| fit(&problem, start, &free, state)).collect();

@@ -11,7 +11,7 @@ use super::rivals::{Place, confidences};
 use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
 use super::whiteness;
-use crate::sim2real::identify::{Fit, State};
+use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Covariate, Part, Twin};
 
 /// A remainder above this part of the first misfit is more than an error of form.
@@ -89,7 +89,7 @@ pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<
     };
     let left = |parts: &[Part<'_, T::Stimulus>]| -> Vec<Left> {
         let problem = inquiry.problem(&selected.twin, parts);
-        let residual = problem.evaluate(&selected.fit.values, &State::estimated(&problem), &[]).residual;
+        let residual = problem.evaluate(&selected.fit.values, &inquiry.evidence.initial_state(&problem), &[]).residual;
         let blocks = problem.blocks();
         let first = blocks.first().map(|b| b.channel.clone());
         let of_first = blocks.into_iter().filter(|b| Some(&b.channel) == first.as_ref());

@@ -45,23 +45,24 @@ impl Fit {
 pub fn fit_smooth<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize], state: &State) -> Fit {
     let mut state = state.clone();
     let mut theta = start.to_vec();
-    let mut best = None::<f64>;
-    // Initial states are solved for to first order only: move them there, and fit again until it no longer matters.
+    let rows = measured_rows(problem);
+    let measured = |theta: &[f64], state: &State| {
+        let evaluation = problem.evaluate(theta, state, &[]);
+        (evaluation.residual.rows(0, rows).norm_squared(), evaluation.initial_step)
+    };
+    // Initial states are solved for to first order only: move them there, and fit again where that made a difference.
     for _ in 0..4 {
         theta = descend(problem, theta, free, &state);
-        let evaluation = problem.evaluate(&theta, &state, &[]);
-        let blocks = measured_rows(problem);
-        let rows = evaluation.residual.rows(0, blocks);
-        let misfit = (rows.norm_squared() / blocks.max(1) as f64).sqrt().max(1.0);
-        for (values, step) in state.values.iter_mut().zip(&evaluation.initial_step) {
+        let (foreseen, steps) = measured(&theta, &state);
+        for (values, step) in state.values.iter_mut().zip(&steps) {
             values.iter_mut().zip(step).for_each(|(value, step)| *value += step);
         }
+        let misfit = (foreseen / rows.max(1) as f64).sqrt().max(1.0);
+        let tempered = (misfit / state.misfit).ln().abs();
         state.misfit = misfit;
-        let objective = rows.norm_squared();
-        if best.is_some_and(|best| objective > best * (1.0 - 1e-3)) || evaluation.initial_step.iter().all(Vec::is_empty) {
+        if steps.iter().all(Vec::is_empty) || (measured(&theta, &state).0 / foreseen - 1.0).abs() < 1e-3 && tempered < 0.7 {
             break;
         }
-        best = Some(objective);
     }
     describe(problem, theta, free, state)
 }
@@ -80,7 +81,7 @@ fn descend<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usiz
     let mut target = Target { problem, state, free, maps, point: point.clone(), theta, cached: None };
     target.set_params(&point);
     let settings =
-        LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-9).with_gtol(1e-10).with_stepbound(1.0).with_patience(20);
+        LevenbergMarquardt::new().with_ftol(1e-7).with_xtol(1e-7).with_gtol(1e-10).with_stepbound(1.0).with_patience(20);
     settings.minimize(target).0.theta
 }
 

@@ -173,6 +173,18 @@ impl State {
     #[must_use]
     pub fn estimated<S: Simulator>(problem: &Problem<'_, S>) -> Self {
         let initial = problem.initial();
+        Self::at_nominal(initial)
+    }
+
+    /// All parts at the estimates their recordings give, which count for nothing: the fit alone decides.
+    #[must_use]
+    pub fn unknown<S: Simulator>(problem: &Problem<'_, S>) -> Self {
+        let mut initial = problem.initial();
+        initial.iter_mut().flatten().filter(|p| !p.frozen()).for_each(|p| p.prior = None);
+        Self::at_nominal(initial)
+    }
+
+    fn at_nominal(initial: Vec<Vec<Parameter>>) -> Self {
         let values = initial.iter().map(|p| p.iter().map(|p| p.nominal).collect()).collect();
         Self { initial, values, misfit: 1.0 }
     }
