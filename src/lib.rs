@@ -7,4 +7,5 @@
 #![forbid(unsafe_code)]
 
 pub mod market;
+pub mod report;
 pub mod sim2real;
