@@ -7,9 +7,12 @@
 /// it leaves a column empty. It holds at most `2 * buckets` points.
 pub(super) fn extremes(x: &[f64], y: &[Option<f64>], buckets: usize) -> Vec<Vec<(f64, f64)>> {
     let rows = x.len().min(y.len());
-    let (low, high) = x.iter().filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) =
+        x.iter().filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     let whole = rows <= 2 * buckets || high <= low;
-    let column = |row: usize| if whole { row } else { ((x[row] - low) / (high - low) * buckets as f64).min(buckets as f64 - 1.0) as usize };
+    let column = |row: usize| {
+        if whole { row } else { ((x[row] - low) / (high - low) * buckets as f64).min(buckets as f64 - 1.0) as usize }
+    };
 
     let mut stretches = vec![Vec::new()];
     let mut row = 0;

@@ -66,7 +66,8 @@ impl Page<'_> {
             include_str!("templates/page.html"),
             context! {
                 kind => self.kind,
-                heading => &self.heading,
+                // A number does not part from its percent sign.
+                heading => self.heading.replace(" %", "\u{a0}%"),
                 badge => badge.unwrap_or(Value::from(())),
                 style => Value::from_safe_string(include_str!("templates/page.css").into()),
                 sections => sections,

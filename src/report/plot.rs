@@ -51,7 +51,7 @@ impl Ink {
     }
 
     fn width(self) -> f64 {
-        if self == Self::Measured { 3.0 } else { 1.6 }
+        if self == Self::Measured { 4.5 } else { 1.7 }
     }
 
     /// Dashes tell the twins apart where colour does not.
@@ -125,6 +125,8 @@ pub(super) struct Plot<'a> {
 /// Widths of the two drawings [px].
 const WIDE: f64 = 1080.0;
 const NARROW: f64 = 344.0;
+/// Room for the labels of the y axis [px].
+const MARGIN_LEFT: f64 = 62.0;
 /// Dots of one series at most.
 const DOTS: usize = 600;
 
@@ -134,7 +136,7 @@ impl Plot<'_> {
         if self.diagonal {
             return format!("<div class=\"drawing\">{}</div>", self.on_canvas(id, NARROW, self.height.1, 0));
         }
-        let narrow_columns = self.columns.min(NARROW as usize);
+        let narrow_columns = self.columns.min(NARROW as usize).min(self.columns / 2 + 100);
         format!(
             "<div class=\"drawing wide\">{}</div><div class=\"drawing narrow\">{}</div>",
             self.on_canvas(&format!("{id}-w"), WIDE, self.height.0, self.columns),
@@ -212,7 +214,7 @@ impl Plot<'_> {
         theme.tick_color = "var(--rule)".into();
         theme.grid_color = "var(--grid)".into();
         theme.text_color = "var(--soft)".into();
-        let x_step = round_step((x.1 - x.0) / (width / 115.0).max(2.0));
+        let x_step = round_step((x.1 - x.0) / (width / 95.0).max(2.0));
         let mut layout = Layout::new(x, y)
             .with_width(width)
             .with_height(height)
@@ -221,7 +223,10 @@ impl Plot<'_> {
             .with_x_axis_max(x.1)
             .with_y_axis_min(y.0)
             .with_y_axis_max(y.1)
-            .with_y_tick_step(round_step((y.1 - y.0) / (height / 52.0).max(2.0)))
+            .with_y_tick_step(round_step((y.1 - y.0) / ((height - 60.0) / 36.0).max(2.0)))
+            // The same margins everywhere, so that plots of the same time stand exactly below each other.
+            .with_force_margins(MARGIN_LEFT, 12.0)
+            .with_force_margins_y(8.0, if self.x_label.is_empty() { 26.0 } else { 46.0 })
             .with_x_label(plain(&self.x_label))
             .with_y_label(plain(&self.y_label))
             .with_tick_format(TickFormat::Custom(std::sync::Arc::new(tick)))
@@ -230,15 +235,15 @@ impl Plot<'_> {
             .with_tick_length(4.0);
         layout = match self.scale {
             Scale::Number => layout.with_x_tick_step(x_step),
-            Scale::Date => layout.with_x_datetime(date_axis(x.1 - x.0, width / 110.0)),
+            Scale::Date => layout.with_x_datetime(date_axis(x.1 - x.0, width / 86.0)),
         };
         for shade in &self.shades {
             let (start, end) = (shade.start.max(x.0), shade.end.min(x.1));
             if end <= start {
                 continue;
             }
-            layout = layout
-                .with_shaded_region(ShadedRegion::vertical(start, end).with_color("var(--shade)").with_opacity(1.0));
+            layout =
+                layout.with_shaded_region(ShadedRegion::vertical(start, end).with_color("var(--shade)").with_opacity(1.0));
             // A label wider than its stretch would run into its neighbour's.
             if (end - start) / (x.1 - x.0) * width > 34.0 {
                 let top = y.1 - 10.0 / height * (y.1 - y.0);
@@ -267,12 +272,13 @@ fn padded((low, high): (f64, f64)) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is at least `step`.
+/// What of 1, 2, 2.5, 5 times a power of ten is nearest to `step`, as ratios go.
 fn round_step(step: f64) -> f64 {
     let power = 10.0_f64.powf(step.log10().floor());
     let leading = step / power;
-    let round = [1.0, 2.0, 5.0].into_iter().find(|r| *r >= leading * (1.0 - 1e-9)).unwrap_or(10.0);
-    round * power
+    let distance = |round: f64| (round / leading).ln().abs();
+    let nearest = [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+    nearest.unwrap_or(1.0) * power
 }
 
 /// Calendar ticks, at most `most` of them over `span` seconds.
@@ -352,7 +358,7 @@ mod tests {
 
     #[test]
     fn steps_are_round() {
-        assert_eq!((round_step(0.3), round_step(20.0), round_step(6.0)), (0.5, 20.0, 10.0));
+        assert_eq!((round_step(0.23), round_step(20.0), round_step(8.0)), (0.25, 20.0, 10.0));
         assert_eq!(date_axis(86_400.0 * 365.0, 9.0).step, 3);
         assert_eq!(date_axis(86_400.0 * 36_500.0, 3.0).step, 10);
     }

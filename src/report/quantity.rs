@@ -54,6 +54,14 @@ pub(super) fn percent(part: f64) -> String {
     }
 }
 
+/// An interval of parts of one, as percentages to a tenth.
+pub(super) fn percents(low: f64, high: f64) -> String {
+    if !low.is_finite() || !high.is_finite() {
+        return UNDEFINED.into();
+    }
+    format!("{} to {} %", decimals(100.0 * low, 1), decimals(100.0 * high, 1))
+}
+
 /// A number on an axis: no more digits than it needs, millions as `M`.
 pub(super) fn tick(value: f64) -> String {
     if value == 0.0 {
@@ -74,9 +82,9 @@ pub(super) fn tick(value: f64) -> String {
     format!("{text}{suffix}")
 }
 
-/// `text` with a unit after it, if there is one.
+/// `text` with a unit after it, if there is one and something to measure with it.
 pub(super) fn with_unit(text: &str, unit: &str) -> String {
-    if unit.is_empty() { text.into() } else { format!("{text} {unit}") }
+    if unit.is_empty() || text == UNDEFINED { text.into() } else { format!("{text} {unit}") }
 }
 
 /// An axis label: `position [rad]`.

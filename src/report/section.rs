@@ -25,7 +25,9 @@ pub trait Section {
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// A template asked for something its section does not give, or is malformed.
-    #[error("template `{template}` of the report cannot be rendered: {source}\nhint: this is a bug in trueup, not in the input")]
+    #[error(
+        "template `{template}` of the report cannot be rendered: {source}\nhint: this is a bug in trueup, not in the input"
+    )]
     Template {
         /// File name of the template.
         template: &'static str,

@@ -2,7 +2,7 @@
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{number, percent, uncertain, with_unit};
+use crate::report::quantity::{number, percent, percents, uncertain, with_unit};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, Verdict};
 
@@ -91,8 +91,12 @@ fn channel(fit: &ChannelFit) -> Value {
     context! {
         name => &fit.channel,
         better => percent(better.abs()),
-        direction => if better < 0.0 { "higher" } else { "lower" },
-        interval => format!("{} to {}", percent(low), percent(high)),
+        direction => match better {
+            b if b.is_nan() => "",
+            b if b < 0.0 => "higher error",
+            _ => "lower error",
+        },
+        interval => percents(low, high),
         floor => with_unit(&number(fit.noise_floor), &fit.unit),
         floor_at => width(fit.noise_floor, largest),
         bars => vec![

@@ -16,7 +16,7 @@ impl Section for Effects<'_> {
     }
 
     fn title(&self) -> &'static str {
-        "What was found, and where"
+        "What was found"
     }
 
     fn render(&self) -> Result<String, ReportError> {
@@ -57,8 +57,7 @@ fn row(effect: &Effect) -> Value {
         .iter()
         .map(|(name, e)| context! { name => name, value => with_unit(&uncertain(e.value, e.std), &e.unit) })
         .collect();
-    let rivals: Vec<String> =
-        effect.rivals.iter().map(|r| format!("{} ({})", r.mechanism, percent(r.confidence))).collect();
+    let rivals: Vec<String> = effect.rivals.iter().map(|r| format!("{} ({})", r.mechanism, percent(r.confidence))).collect();
     context! {
         name => &effect.mechanism,
         site => effect.site.to_string(),

@@ -87,8 +87,10 @@ mod tests {
 
     #[test]
     fn drawdown_is_measured_from_the_peak_so_far() {
-        assert_eq!(drawdown(&[100.0, 80.0, 200.0, 150.0]), vec![Some(0.0), Some(-20.0), Some(0.0), Some(-25.0)]
-            .into_iter().map(|v| v.map(|v: f64| v)).collect::<Vec<_>>());
+        let below: Vec<f64> = drawdown(&[100.0, 80.0, 200.0, 150.0]).into_iter().flatten().collect();
+        for (found, expected) in below.iter().zip([0.0, -20.0, 0.0, -25.0]) {
+            assert!((found - expected).abs() < 1e-9, "{below:?}");
+        }
         assert_eq!(drawdown(&[-1.0]), vec![None]);
     }
 }

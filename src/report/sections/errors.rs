@@ -2,7 +2,7 @@
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{axis, number, percent};
+use crate::report::quantity::{axis, number, percents};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::Diagnosis;
 
@@ -16,7 +16,7 @@ impl Section for Errors<'_> {
     }
 
     fn title(&self) -> &'static str {
-        "Errors on held-out data"
+        "Errors"
     }
 
     fn render(&self) -> Result<String, ReportError> {
@@ -34,7 +34,7 @@ impl Section for Errors<'_> {
                     floor => number(f.noise_floor),
                     rmse => [f.nominal_rmse, f.recalibrated_rmse, f.trued_rmse].map(number).to_vec(),
                     mae => [f.nominal_mae, f.recalibrated_mae, f.trued_mae].map(number).to_vec(),
-                    improvement => format!("{} to {}", percent(low), percent(high)),
+                    improvement => percents(low, high),
                     ratio => number(f.trued_rmse / f.noise_floor),
                 }
             })

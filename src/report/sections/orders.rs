@@ -23,7 +23,7 @@ impl Section for Orders<'_> {
     }
 
     fn title(&self) -> &'static str {
-        if self.held_out { "On orders no fit has seen" } else { "On the orders that were fitted" }
+        if self.held_out { "Held-out orders" } else { "Fitted orders" }
     }
 
     fn render(&self) -> Result<String, ReportError> {
@@ -33,7 +33,11 @@ impl Section for Orders<'_> {
         }
         let plots: Vec<Value> = all.iter().take(SHOWN).enumerate().map(|(k, t)| self.plots(k, t)).collect();
         let rest: Vec<String> = all.iter().skip(SHOWN).map(|t| t.caption()).collect();
-        fill("orders.html", include_str!("../templates/orders.html"), context! { plots => plots, rest => rest })
+        fill(
+            "orders.html",
+            include_str!("../templates/orders.html"),
+            context! { plots => plots, rest => rest, held_out => self.held_out },
+        )
     }
 }
 

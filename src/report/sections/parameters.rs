@@ -16,7 +16,7 @@ impl Section for Parameters<'_> {
     }
 
     fn title(&self) -> &'static str {
-        "The twin's parameters"
+        "Parameters"
     }
 
     fn render(&self) -> Result<String, ReportError> {

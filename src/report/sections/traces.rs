@@ -16,9 +16,9 @@ pub(in crate::report) struct Traces<'a> {
 }
 
 /// Plots of one section at most; the rest are listed by name.
-pub(super) const SHOWN: usize = 8;
+pub(super) const SHOWN: usize = 6;
 /// Columns of all wide plots of a section together: what keeps a page small.
-const COLUMNS: usize = 4_400;
+const COLUMNS: usize = 3_000;
 
 impl Section for Traces<'_> {
     fn id(&self) -> &'static str {
@@ -26,7 +26,7 @@ impl Section for Traces<'_> {
     }
 
     fn title(&self) -> &'static str {
-        if self.held_out { "On data no fit has seen" } else { "On the data that were fitted" }
+        if self.held_out { "Held-out recordings" } else { "Fitted recordings" }
     }
 
     fn render(&self) -> Result<String, ReportError> {
@@ -37,7 +37,11 @@ impl Section for Traces<'_> {
         let columns = (COLUMNS / all.len().min(SHOWN)).min(1_000);
         let plots: Vec<Value> = all.iter().take(SHOWN).enumerate().map(|(k, t)| self.pair(k, t, columns)).collect();
         let rest: Vec<String> = all.iter().skip(SHOWN).map(|t| t.caption()).collect();
-        fill("traces.html", include_str!("../templates/traces.html"), context! { plots => plots, rest => rest })
+        fill(
+            "traces.html",
+            include_str!("../templates/traces.html"),
+            context! { plots => plots, rest => rest, held_out => self.held_out },
+        )
     }
 }
 
