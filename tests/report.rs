@@ -1,6 +1,8 @@
 //! Pages rendered from synthetic data: whole, small, deterministic, closed to the network and safe with any text.
 //! They are left in cargo's directory for test files, so that they can be looked at.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

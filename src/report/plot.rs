@@ -201,7 +201,7 @@ impl Plot<'_> {
             (x, y) = (padded(both), padded(both));
             return (x, y);
         }
-        if !(x.0 < x.1) {
+        if x.0 >= x.1 {
             x = if x.0.is_finite() { (x.0 - 0.5, x.0 + 0.5) } else { (0.0, 1.0) };
         }
         (x, padded(y))

@@ -49,7 +49,7 @@ pub(super) fn percent(part: f64) -> String {
     match percent.abs() {
         p if p > 0.0 && p < 0.05 => "< 0.1 %".into(),
         p if (99.95..100.0).contains(&p) => "> 99.9 %".into(),
-        p if p < 1.0 || p >= 99.0 && p < 100.0 => format!("{} %", decimals(percent, 1)),
+        p if p < 1.0 || (99.0..100.0).contains(&p) => format!("{} %", decimals(percent, 1)),
         _ => format!("{} %", decimals(percent, 0)),
     }
 }

@@ -2,7 +2,7 @@
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{number, percent, uncertain, with_unit};
+use crate::report::quantity::{percent, significant, uncertain, with_unit};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::{Diagnosis, Effect};
 
@@ -29,8 +29,8 @@ impl Section for Effects<'_> {
                 context! {
                     recording => &i.recording,
                     channel => &i.channel,
-                    start => with_unit(&number(i.start), "s"),
-                    end => with_unit(&number(i.end), "s"),
+                    start => with_unit(&significant(i.start, 4), "s"),
+                    end => with_unit(&significant(i.end, 4), "s"),
                     share => percent(i.share_of_error),
                 }
             })
@@ -44,7 +44,7 @@ impl Section for Effects<'_> {
             context! {
                 rows => rows,
                 intervals => intervals,
-                onset => location.onset.map(|t| with_unit(&number(t), "s")),
+                onset => location.onset.map(|t| with_unit(&significant(t, 4), "s")),
                 modelled => self.diagnosis.modelled.clone(),
             },
         )
