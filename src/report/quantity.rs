@@ -40,17 +40,17 @@ pub(super) fn uncertain(value: f64, std: f64) -> String {
     format!("{} \u{b1} {}", decimals(value, places), decimals(std, places))
 }
 
-/// A part of one as a percentage; 99.97 % does not read as 100 %, nor 0.02 % as 0 %.
+/// A part of one as a percentage, with a space before the sign that does not break; 99.97 % does not read as 100 %, nor 0.02 % as 0 %.
 pub(super) fn percent(part: f64) -> String {
     if !part.is_finite() {
         return UNDEFINED.into();
     }
     let percent = 100.0 * part;
     match percent.abs() {
-        p if p > 0.0 && p < 0.05 => "< 0.1 %".into(),
-        p if (99.95..100.0).contains(&p) => "> 99.9 %".into(),
-        p if p < 1.0 || (99.0..100.0).contains(&p) => format!("{} %", decimals(percent, 1)),
-        _ => format!("{} %", decimals(percent, 0)),
+        p if p > 0.0 && p < 0.05 => "< 0.1\u{a0}%".into(),
+        p if (99.95..100.0).contains(&p) => "> 99.9\u{a0}%".into(),
+        p if p < 1.0 || (99.0..100.0).contains(&p) => format!("{}\u{a0}%", decimals(percent, 1)),
+        _ => format!("{}\u{a0}%", decimals(percent, 0)),
     }
 }
 
@@ -59,7 +59,7 @@ pub(super) fn percents(low: f64, high: f64) -> String {
     if !low.is_finite() || !high.is_finite() {
         return UNDEFINED.into();
     }
-    format!("{} to {} %", decimals(100.0 * low, 1), decimals(100.0 * high, 1))
+    format!("{} to {}\u{a0}%", decimals(100.0 * low, 1), decimals(100.0 * high, 1))
 }
 
 /// A number on an axis: no more digits than it needs, millions as `M`.
@@ -156,7 +156,10 @@ mod tests {
         assert_eq!(uncertain(0.180_34, 0.0021), "0.1803 \u{b1} 0.0021");
         assert_eq!(uncertain(12_345.6, 120.0), "12,346 \u{b1} 120");
         assert_eq!(uncertain(2.5, f64::NAN), "2.500");
-        assert_eq!((percent(0.9997), percent(0.98), percent(0.0002)), ("> 99.9 %".into(), "98 %".into(), "< 0.1 %".into()));
+        assert_eq!(
+            (percent(0.9997), percent(0.98), percent(0.0002)),
+            ("> 99.9\u{a0}%".into(), "98\u{a0}%".into(), "< 0.1\u{a0}%".into())
+        );
     }
 
     #[test]
