@@ -6,5 +6,6 @@
 #![deny(missing_docs)]
 #![forbid(unsafe_code)]
 
+pub mod conceal;
 pub mod market;
 pub mod sim2real;
