@@ -79,7 +79,7 @@ impl Default for Exchange {
             session: 23_400.0,
             ticks_per_unit: 100,
             level: 5_000.0,
-            volatility: 0.28,
+            volatility: 0.32,
             orders: 800,
             sizes: (20, 400),
             latency: 0.12,

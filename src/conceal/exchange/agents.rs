@@ -25,6 +25,8 @@ const REGRET: f64 = 25.0;
 const SNIPES: f64 = 0.9;
 /// Mean distance of a limit order from the value, beyond the first tick [ticks].
 const REACH: f64 = 3.2;
+/// Distance from the value that the dealer lets no best price exceed [ticks].
+const WIDEST: f64 = 5.0;
 /// Levels below which a patient dealer posts behind the others, so that a side never runs empty.
 const PATIENT: usize = 12;
 
@@ -44,7 +46,7 @@ impl Climate {
     pub(super) fn new(start: f64, end: f64, level: f64, volatility: f64, seed: Seed) -> Self {
         let (mut values, mut moods) = (seed.stream("exchange value"), seed.stream("exchange activity"));
         let points = ((end - start) / GRID).ceil() as usize + 2;
-        let (memory, spread) = ((-GRID / 40.0_f64).exp(), 1.2_f64);
+        let (memory, spread) = ((-GRID / 30.0_f64).exp(), 1.4_f64);
         let (mut mood, mut value) = (0.0, level);
         let mut climate = Self { value: Vec::with_capacity(points), activity: Vec::with_capacity(points), start };
         for point in 0..points {
@@ -158,6 +160,13 @@ impl Agents {
     /// The dealer's orders behind the last level, until there are enough levels.
     fn patience(&mut self, book: &mut OrderBook, value: f64) {
         for side in [Side::Buy, Side::Sell] {
+            let farthest = (value - side.sign() as f64 * WIDEST).round() as i64;
+            if book.best(side).is_some_and(|best| side.sign() * (farthest - best) > 0)
+                && book.best(side.opposite()).is_some_and(|facing| side.sign() * (facing - farthest) > 0)
+            {
+                let quantity = self.size(160.0, 0.4);
+                self.rest(book, side, farthest, quantity);
+            }
             while book.levels(side) < PATIENT {
                 let facing = book.best(side.opposite()).unwrap_or(value.round() as i64);
                 let last = book.depth(side, PATIENT).last().map_or(facing, |level| level.0);

@@ -63,7 +63,8 @@ impl Client {
         let total = busy.last().copied().unwrap_or_default();
         let mut times: Vec<f64> = (0..exchange.orders)
             .map(|_| {
-                let second = busy.partition_point(|sum| *sum < rng.random::<f64>() * total);
+                let drawn = rng.random::<f64>() * total;
+                let second = busy.partition_point(|sum| *sum < drawn);
                 30.0 + second as f64 + rng.random::<f64>()
             })
             .collect();
