@@ -8,6 +8,7 @@
 #![deny(missing_docs)]
 #![forbid(unsafe_code)]
 
+pub mod conceal;
 pub mod market;
 pub mod report;
 pub mod robot;
