@@ -10,6 +10,7 @@ mod feed_format;
 mod instrument_entry;
 mod output_folder;
 mod output_table;
+mod parquet_pages;
 mod quantity;
 mod relative_path;
 mod run_file;
