@@ -9,6 +9,8 @@
 #![forbid(unsafe_code)]
 
 pub mod conceal;
+#[cfg(feature = "io")]
+pub mod io;
 pub mod market;
 pub mod report;
 pub mod robot;
