@@ -276,7 +276,7 @@ fn on_tape(
             ..LogError::of(
                 LogTable::Orders,
                 format!(
-                    "{} of {count} orders are outside the tape; this one is decided {seconds} s {end} ({from})",
+                    "{} of {count} orders are outside the tape; this one is decided {seconds:.3} s {end} ({from})",
                     outside.len()
                 ),
                 outside_hint(seconds),
