@@ -6,5 +6,7 @@
 #![deny(missing_docs)]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "io")]
+pub mod io;
 pub mod market;
 pub mod sim2real;
