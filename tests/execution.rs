@@ -302,8 +302,13 @@ fn orders_off_the_tape_are_an_error_that_says_by_how_much() {
         log(tape(), PriceAssumption::Mid, &orders, &[]).unwrap_err().to_string()
     };
     let early = shifted(-5 * 3600);
-    assert!(early.contains("40 of 40 orders are outside the tape; this one is decided 18000.000 s before the tape begins"), "{early}");
-    assert!(early.contains("row 1, column `decided_at`") && early.contains("hint: is one of the files in another zone, 5 h"));
+    assert!(
+        early.contains("40 of 40 orders are outside the tape; this one is decided 18000.000 s before the tape begins"),
+        "{early}"
+    );
+    assert!(
+        early.contains("row 1, column `decided_at`") && early.contains("hint: is one of the files in another zone, 5 h")
+    );
     assert!(shifted(4 * 3600).contains("after the tape ends"));
     assert!(shifted(-1_600_000_000).contains("time_unit"));
     let nothing = log(Tape::default(), PriceAssumption::Mid, &orders(), &[]).unwrap_err().to_string();

@@ -55,8 +55,11 @@ fn tape_of_folder(folder: &Path, settings: &LogSettings<'_>) -> Result<Tape, Inp
     let (quotes, trades, bars) = (table_in(folder, "quotes")?, table_in(folder, "trades")?, table_in(folder, "bars")?);
     let files = TapeFiles { quotes: quotes.as_deref(), trades: trades.as_deref(), bars: bars.as_deref() };
     if files == TapeFiles::default() {
-        return Err(InputError::new(folder, "there are neither quotes nor trades nor bars: nothing says what the market did")
-            .hint("name the tape under [market] in the twin, or put quotes, trades or bars beside the orders"));
+        return Err(InputError::new(
+            folder,
+            "there are neither quotes nor trades nor bars: nothing says what the market did",
+        )
+        .hint("name the tape under [market] in the twin, or put quotes, trades or bars beside the orders"));
     }
     read_tape(files, &settings.market.format)
 }

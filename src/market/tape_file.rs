@@ -39,7 +39,8 @@ pub fn read_tape(files: TapeFiles<'_>, format: &FeedFormat) -> Result<Tape, Inpu
 
 /// Opens a table with those of the format's names that it has: one section may rename the columns of several files.
 fn open(path: &Path, format: &FeedFormat, meaningful: impl Fn(&str) -> bool) -> Result<Table, InputError> {
-    let renames: Renames = format.columns.iter().filter(|(name, _)| meaningful(name)).map(|(a, b)| (a.clone(), b.clone())).collect();
+    let renames: Renames =
+        format.columns.iter().filter(|(name, _)| meaningful(name)).map(|(a, b)| (a.clone(), b.clone())).collect();
     Table::read_with(path, &renames)
 }
 
@@ -145,19 +146,29 @@ fn read_bars(path: &Path, format: &FeedFormat) -> Result<Vec<TapeBar>, InputErro
     let (opens, closes) = (above_zero(&table, "open")?, above_zero(&table, "close")?);
     let volumes = not_negative(&table, "volume")?;
     let Some(length) = common_spacing(&times) else {
-        return Err(InputError::new(path, "one bar alone does not say how long it is").hint("a tape needs two bars at least"));
+        return Err(
+            InputError::new(path, "one bar alone does not say how long it is").hint("a tape needs two bars at least")
+        );
     };
     let bar = |row: usize| {
         // A bar never reaches into its neighbour: a change of daylight saving time makes one shorter.
         let (open_at, known_at) = match stamp {
-            Stamp::Open => (times[row], times.get(row + 1).map_or(times[row] + length, |next| *next.min(&(times[row] + length)))),
+            Stamp::Open => {
+                (times[row], times.get(row + 1).map_or(times[row] + length, |next| *next.min(&(times[row] + length))))
+            }
             Stamp::Close => {
                 let start = times[row] + -length;
                 (if row > 0 { start.max(times[row - 1]) } else { start }, times[row])
             }
         };
         let scaled = |price: f64| price * format.price_scale;
-        TapeBar { open_at, known_at, open: scaled(opens[row]), close: scaled(closes[row]), volume: volumes[row].unwrap_or(0.0) }
+        TapeBar {
+            open_at,
+            known_at,
+            open: scaled(opens[row]),
+            close: scaled(closes[row]),
+            volume: volumes[row].unwrap_or(0.0),
+        }
     };
     Ok((0..times.len()).map(bar).collect())
 }

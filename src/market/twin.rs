@@ -55,7 +55,8 @@ pub fn execution_assembly(twin: &TwinFile) -> Result<Assembly<Execution>, InputE
         assembly = assembly.with_mechanism(mechanism, form, parameters);
     }
     let Some(assumptions) = &twin.assumptions else { return Err(no_assumptions(twin)) };
-    let commissions = [("commission_bps", assumptions.commission_bps), ("commission_per_share", assumptions.commission_per_share)];
+    let commissions =
+        [("commission_bps", assumptions.commission_bps), ("commission_per_share", assumptions.commission_per_share)];
     for (form, (key, value)) in commissions.into_iter().enumerate() {
         let Some(value) = value.filter(|value| *value != 0.0) else { continue };
         if twin.mechanisms.iter().any(|entry| entry.name == "commission") {
@@ -114,7 +115,12 @@ fn no_assumptions(twin: &TwinFile) -> InputError {
 type Part<P> = (&'static dyn Mechanism<P>, usize, Vec<Parameter>);
 
 /// The row of `registry` that entry `index` of the twin's mechanisms names, in the form its keys say, with its values.
-fn part<P: Plant>(twin: &TwinFile, index: usize, entry: &MechanismEntry, registry: Registry<P>) -> Result<Part<P>, InputError> {
+fn part<P: Plant>(
+    twin: &TwinFile,
+    index: usize,
+    entry: &MechanismEntry,
+    registry: Registry<P>,
+) -> Result<Part<P>, InputError> {
     let number = index.to_string();
     let names: Vec<&str> = registry.iter().map(|mechanism| mechanism.about().name).collect();
     let Some(mechanism) = registry.iter().find(|mechanism| mechanism.about().name == entry.name) else {
