@@ -95,15 +95,63 @@ fn mechanisms_are_read_in_the_form_their_keys_say() {
 #[test]
 fn bad_twins_are_said_with_place_and_remedy() {
     let with = |mechanism: &str| error(&[("twin.toml", &format!("{TWIN}\n[[mechanism]]\n{mechanism}\n"))]);
-    insta::assert_snapshot!(with("name = \"half_spred\"\nfraction = 1.0"), @"");
-    insta::assert_snapshot!(with("name = \"half_spread\"\nfracton = 1.0"), @"");
-    insta::assert_snapshot!(with("name = \"half_spread\""), @"");
-    insta::assert_snapshot!(with("name = \"half_spread\"\nbps = 1.0"), @"");
-    insta::assert_snapshot!(with("name = \"command_delay\"\nseconds = -1.0"), @"");
-    insta::assert_snapshot!(error(&[("twin.toml", &TWIN.replace("execution", "joint"))]), @"");
-    insta::assert_snapshot!(error(&[("twin.toml", &format!("{TWIN}[parameters]\nspread = 1.0\n"))]), @"");
-    insta::assert_snapshot!(error(&[("twin.toml", &TWIN.replace("\"mid\"", "\"last\""))]), @"");
-    insta::assert_snapshot!(error(&[("twin.toml", &TWIN.replace("XYZ", "XYY"))]), @"");
+    insta::assert_snapshot!(with("name = \"half_spred\"\nfraction = 1.0"), @"
+    twin.toml:12:1: there is no mechanism `half_spred`
+      hint: did you mean `half_spread`?
+    ");
+    insta::assert_snapshot!(with("name = \"half_spread\"\nfracton = 1.0"), @"
+    twin.toml:13:1: `half_spread` has no parameter `fracton`
+      hint: did you mean `fraction`?
+    ");
+    insta::assert_snapshot!(with("name = \"half_spread\""), @"
+    twin.toml:11:1: the parameters of `half_spread` are not complete
+      hint: give `fraction`, or `bps`
+    ");
+    assert_eq!(with("name = \"half_spread\"\nbps = 1.0"), "no error");
+    insta::assert_snapshot!(with("name = \"command_delay\"\nseconds = -1.0"), @"
+    twin.toml:13:1: expected a value from 0 to 60, found -1
+      hint: its unit is [s]
+    ");
+    insta::assert_snapshot!(error(&[("twin.toml", &TWIN.replace("execution", "joint"))]), @r#"twin.toml:3:1: expected the model "execution", found "joint""#);
+    insta::assert_snapshot!(error(&[("twin.toml", &format!("{TWIN}[parameters]\nspread = 1.0\n"))]), @"
+    twin.toml:11:1: `execution` has no parameter `spread`
+      hint: what stands between decision and fill is said by [[mechanism]] sections
+    ");
+    insta::assert_snapshot!(error(&[("twin.toml", &TWIN.replace("\"mid\"", "\"last\""))]), @r#"
+    orders.csv: the twin assumes the price "last", but there are no trades
+      hint: name trades under [market] in the twin, or put them beside the orders
+    "#);
+    insta::assert_snapshot!(error(&[("twin.toml", &TWIN.replace("XYZ", "XYY"))]), @r#"
+    orders.csv: row 2, column `symbol`: the twin declares no such instrument, found "XYZ"
+      hint: did you mean `XYY`?
+    "#);
+}
+
+const BARS: &str = "ts,open,high,low,close,volume\n\
+    -1000000000,100,101,99,100,50\n0,100,101,99,100.5,50\n1000000000,100.5,101,99,101,50\n2000000000,101,101,99,100,50\n";
+
+#[test]
+fn bars_are_a_tape_once_their_stamp_is_said() {
+    let bars = |market: &str, price: &str, more: &str| {
+        let twin =
+            format!("{}\n[market]\nbars = \"bars.csv\"\n{market}\n{more}", TWIN.replace("\"mid\"", &format!("\"{price}\"")));
+        folder(&[("twin.toml", &twin), ("quotes.csv", "")])
+    };
+    let read_with = |market: &str, price: &str, more: &str| {
+        let folder = bars(market, price, more);
+        fs::write(folder.path().join("bars.csv"), BARS).unwrap();
+        read(folder.path()).map_err(|error| error.to_string())
+    };
+    let (_, recording) = read_with("stamp = \"open\"", "bar_close", "").unwrap();
+    let assumed =
+        |recording: &Recording<OrderLog>| recording.stimulus.orders().iter().map(|o| o.assumed).collect::<Vec<_>>();
+    assert_eq!(assumed(&recording), [100.5, 101.0]);
+    assert_eq!(assumed(&read_with("stamp = \"open\"", "next_open", "").unwrap().1), [100.5, 101.0]);
+    assert_eq!(assumed(&read_with("stamp = \"close\"", "bar_close", "").unwrap().1), [101.0, 100.0]);
+    assert!(read_with("", "bar_close", "").unwrap_err().contains("stamp"));
+    let spread = "[[mechanism]]\nname = \"half_spread\"\nfraction = 1.0\n";
+    let error = read_with("stamp = \"open\"", "bar_close", spread).unwrap_err();
+    assert!(error.contains("lacks the data `half_spread` needs") && error.contains("need quotes"), "{error}");
 }
 
 #[test]
@@ -111,19 +159,58 @@ fn bad_logs_are_said_with_file_row_column_and_remedy() {
     let orders = |from: &str, to: &str| error(&[("orders.csv", &ORDERS.replace(from, to))]);
     let fills = |from: &str, to: &str| error(&[("fills.csv", &FILLS.replace(from, to))]);
     let quotes = |from: &str, to: &str| error(&[("quotes.csv", &QUOTES.replace(from, to))]);
-    insta::assert_snapshot!(orders("sell,5,market", "sel,5,market"), @"");
-    insta::assert_snapshot!(orders("buy,20", "buy,-20"), @"");
-    insta::assert_snapshot!(orders("b,XYZ", "a,XYZ"), @"");
-    insta::assert_snapshot!(orders("b,XYZ", "b,ABC"), @"");
-    insta::assert_snapshot!(orders("a,XYZ,1000000000", "a,XYZ,19000000000000"), @"");
-    insta::assert_snapshot!(orders("market", "limit"), @"");
-    insta::assert_snapshot!(fills("b,2000000001", "x,2000000001"), @"");
-    insta::assert_snapshot!(fills("b,2000000001", "b,1999999999"), @"");
-    insta::assert_snapshot!(fills("100.03", "-100.03"), @"");
-    insta::assert_snapshot!(quotes("99.99", "100.02"), @"");
-    insta::assert_snapshot!(quotes("99.99", "-99.99"), @"");
-    insta::assert_snapshot!(error(&[("quotes.csv", "")]), @"");
-    insta::assert_snapshot!(error(&[("fills.csv", "")]), @"");
+    insta::assert_snapshot!(orders("sell,5,market", "sel,5,market"), @r#"
+    orders.csv: row 3, column `side`: expected `buy` or `sell`, found "sel"
+      hint: did you mean `sell`?
+    "#);
+    insta::assert_snapshot!(orders("buy,20", "buy,-20"), @"
+    orders.csv: row 2, column `qty`: expected a number above 0, found -20
+      hint: quantities are above 0; which way an order trades is said by its side
+    ");
+    insta::assert_snapshot!(orders("b,XYZ", "a,XYZ"), @r#"
+    orders.csv: row 3, column `order_id`: the id is that of data row 1 too, found "a"
+      hint: each order has an id of its own; are rows doubled, or days put together that count from 1 again?
+    "#);
+    insta::assert_snapshot!(orders("b,XYZ", "b,ABC"), @r#"
+    orders.csv: row 3, column `symbol`: expected `XYZ`, as in the first row, found "ABC"
+      hint: a tape is of one instrument: put the orders of each symbol into a folder of their own
+    "#);
+    insta::assert_snapshot!(orders("2000000000,sell,5,limit,100.5", "19000000000000,sell,5,market,"), @"
+    orders.csv: row 4, column `decided_at`: 1 of 3 orders are outside the tape; this one is decided 18997.000 s after the tape ends (1970-01-01T00:00:03Z), found 1970-01-01T05:16:40Z
+      hint: is one of the files in another zone, 5 h or more away? Declare its `zone`
+    ");
+    insta::assert_snapshot!(orders("market", "limit"), @r#"
+    orders.csv: none of the 3 orders is a market order; the first is "limit"
+      hint: only market orders are modelled so far
+    "#);
+    insta::assert_snapshot!(fills("b,2000000001", "x,2000000001"), @r#"
+    fills.csv: row 4, column `order_id`: there is no such order, found "x"
+      hint: each fill names a row of orders: are both files of one log?
+    "#);
+    insta::assert_snapshot!(fills("b,2000000001", "b,1999999999"), @r#"
+    fills.csv: row 4, column `filled_at`: order "b" is filled 0.000000001 s before it was decided (1970-01-01T00:00:02Z), found 1970-01-01T00:00:01.999999999Z
+      hint: are both columns in the same zone and unit, and from the same clock?
+    "#);
+    insta::assert_snapshot!(fills("100.03", "-100.03"), @"
+    fills.csv: row 3, column `price`: expected a number above 0, found -100.03
+      hint: was a fill value written where nothing was known? Then drop the row
+    ");
+    insta::assert_snapshot!(quotes("99.99", "100.02"), @"
+    quotes.csv: row 2, column `bid`: the bid is above the ask, here and in 1 of 2 rows, found 100.02
+      hint: are `bid` and `ask` exchanged?
+    ");
+    insta::assert_snapshot!(quotes("99.99", "-99.99"), @"
+    quotes.csv: row 2, column `bid`: expected a number that is not negative, found -99.99
+      hint: leave the cell empty where a side has nothing
+    ");
+    insta::assert_snapshot!(error(&[("quotes.csv", "")]), @"
+    FOLDER: there are neither quotes nor trades nor bars: nothing says what the market did
+      hint: name the tape under [market] in the twin, or put quotes, trades or bars beside the orders
+    ");
+    insta::assert_snapshot!(error(&[("fills.csv", "")]), @"
+    FOLDER: there is no fills table in the folder
+      hint: an order log is a folder with orders and fills, such as fills.csv or fills.parquet
+    ");
 }
 
 fn abides(name: &str) -> Option<PathBuf> {

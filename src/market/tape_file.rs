@@ -112,10 +112,10 @@ pub(super) fn above_zero(table: &Table, name: &str) -> Result<Vec<f64>, InputErr
     let values = table.floats_complete(name)?;
     match values.iter().position(|value| *value <= 0.0) {
         None => Ok(values),
-        Some(row) => Err(table
-            .error(name, row, "expected a number above 0")
-            .found(values[row])
-            .hint("was a fill value written where nothing was known? Then drop the row")),
+        Some(row) => Err(table.error(name, row, "expected a number above 0").found(values[row]).hint(match name {
+            "qty" => "quantities are above 0; which way an order trades is said by its side",
+            _ => "was a fill value written where nothing was known? Then drop the row",
+        })),
     }
 }
 
