@@ -15,14 +15,34 @@ use crate::sim2real::{
 /// stuck stays where it is, to the bit (Stewart, "Rigid-body dynamics with friction and impact", SIAM Review 42 (2000)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
+    axis: Axis,
     parameters: Vec<Parameter>,
 }
 
-/// The parameters of a joint in their order: name and unit.
-const PARAMETERS: [(&str, &str); 4] =
-    [("inertia", "kg m^2"), ("viscous_friction", "N m s/rad"), ("gravity_torque", "N m"), ("gain", "N m per unit")];
+/// The parameters of a joint in their order: name, unit of a rotary and of a linear axis.
+const PARAMETERS: [(&str, [&str; 2]); 4] = [
+    ("inertia", ["kg m^2", "kg"]),
+    ("viscous_friction", ["N m s/rad", "N s/m"]),
+    ("gravity_torque", ["N m", "N"]),
+    ("gain", ["N m per unit", "N per unit"]),
+];
 
-const CHANNELS: &[Channel] = &[Channel { name: "position", unit: "rad" }, Channel { name: "velocity", unit: "rad/s" }];
+/// The other units that mechanisms of a joint declare, each with what it is on a linear axis.
+const LINEAR: [(&str, &str); 5] =
+    [("N m", "N"), ("N m/rad", "N/m"), ("N m s^2/rad^2", "N s^2/m^2"), ("rad", "m"), ("rad/s", "m/s")];
+
+/// How a joint moves: its units follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
+    /// It turns: positions in rad, efforts in N m.
+    Rotary,
+    /// It slides: positions in m, efforts in N.
+    Linear,
+}
+
+const ROTARY_CHANNELS: &[Channel] =
+    &[Channel { name: "position", unit: "rad" }, Channel { name: "velocity", unit: "rad/s" }];
+const LINEAR_CHANNELS: &[Channel] = &[Channel { name: "position", unit: "m" }, Channel { name: "velocity", unit: "m/s" }];
 
 /// Longest step of integration [s]: at 1 ms smooth motions are right to some microradians.
 const LONGEST_STEP: f64 = 1e-3;
@@ -99,14 +119,14 @@ impl Observation for Posture {
 
 impl Joint {
     /// A joint with the given inertia [kg m^2], viscous friction [N m s/rad], gravity torque [N m] and gain [N m per unit
-    /// of command], known to the given relative standard deviations.
+    /// of command], known to the given relative standard deviations; a linear axis with the units of one.
     #[must_use]
-    pub fn new(values: [f64; 4], uncertainty: [f64; 4]) -> Self {
+    pub fn new(axis: Axis, values: [f64; 4], uncertainty: [f64; 4]) -> Self {
         let parameters = PARAMETERS
             .iter()
             .zip(values.iter().zip(uncertainty))
-            .map(|((name, unit), (value, uncertainty))| {
-                let parameter = Parameter::new(name, unit, *value).known_to((uncertainty * value).abs());
+            .map(|((name, units), (value, uncertainty))| {
+                let parameter = Parameter::new(name, units[axis as usize], *value).known_to((uncertainty * value).abs());
                 match *name {
                     // A massless joint has no motion; the other coefficients may vanish but not change their sign.
                     "inertia" => parameter.within(value * 0.01, f64::INFINITY),
@@ -115,13 +135,13 @@ impl Joint {
                 }
             })
             .collect();
-        Self { parameters }
+        Self { axis, parameters }
     }
 
     /// The names and units of its parameters, in the order of [`Joint::new`].
     #[must_use]
-    pub fn parameter_names() -> [(&'static str, &'static str); 4] {
-        PARAMETERS
+    pub fn parameter_names(axis: Axis) -> [(&'static str, &'static str); 4] {
+        PARAMETERS.map(|(name, units)| (name, units[axis as usize]))
     }
 }
 
@@ -143,7 +163,10 @@ impl Plant for Joint {
     }
 
     fn channels(&self) -> &'static [Channel] {
-        CHANNELS
+        match self.axis {
+            Axis::Rotary => ROTARY_CHANNELS,
+            Axis::Linear => LINEAR_CHANNELS,
+        }
     }
 
     fn parameters(&self) -> Vec<Parameter> {
@@ -184,6 +207,16 @@ impl Plant for Joint {
             ("position", motion.iter().map(|e| e.position).collect()),
             ("velocity", motion.iter().map(|e| e.velocity).collect()),
         ]
+    }
+
+    fn unit(&self, declared: &str) -> String {
+        let declared = match declared {
+            "output" => "rad",
+            "command" => return "unit of the command".to_owned(),
+            other => other,
+        };
+        let linear = LINEAR.iter().find(|(rotary, _)| self.axis == Axis::Linear && *rotary == declared);
+        linear.map_or(declared, |(_, linear)| linear).to_owned()
     }
 
     fn dynamics(&self, thetas: &Thetas) -> JointDynamics {
@@ -300,7 +333,7 @@ mod tests {
     }
 
     fn arm() -> Joint {
-        Joint::new([0.11, 0.25, 2.7, 1.0], [0.2, 0.2, 0.2, 0.0])
+        Joint::new(Axis::Rotary, [0.11, 0.25, 2.7, 1.0], [0.2, 0.2, 0.2, 0.0])
     }
 
     #[test]

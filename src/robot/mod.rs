@@ -2,6 +2,10 @@
 
 mod joint;
 pub mod mechanism;
+#[cfg(feature = "io")]
+mod twin;
 
-pub use joint::{Commands, Joint, JointEffect, JointState, Posture, Torque};
+pub use joint::{Axis, Commands, Joint, JointDynamics, JointEffect, JointState, Posture, Torque};
 pub use mechanism::MECHANISMS;
+#[cfg(feature = "io")]
+pub use twin::{joint_assembly, joint_recordings};

@@ -195,6 +195,14 @@ impl<P: Plant> Simulator for Assembly<P> {
         self.plant.covariates(recording)
     }
 
+    fn notes(&self, recording: &Recording<P::Stimulus>) -> Vec<String> {
+        self.plant.notes(recording)
+    }
+
+    fn unit(&self, declared: &str) -> String {
+        self.plant.unit(declared)
+    }
+
     fn rollout(
         &self,
         thetas: &Thetas,

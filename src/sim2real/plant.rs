@@ -108,6 +108,14 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     fn covariates(&self, _recording: &Recording<Self::Stimulus>) -> Vec<Covariate> {
         Vec::new()
     }
+    /// What was left out or is peculiar about `recording`, in words a report can show.
+    fn notes(&self, _recording: &Recording<Self::Stimulus>) -> Vec<String> {
+        Vec::new()
+    }
+    /// The unit a parameter has here, where mechanisms declare one in general terms.
+    fn unit(&self, declared: &str) -> String {
+        declared.to_owned()
+    }
     /// The running part, one lane a point of `thetas` (in the order of [`Plant::parameters`]).
     fn dynamics(&self, thetas: &Thetas) -> Self::Dynamics;
 }

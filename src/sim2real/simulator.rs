@@ -30,6 +30,10 @@ pub trait Simulator: Send + Sync {
     fn resolution(&self, recording: &Recording<Self::Stimulus>, channel: &str) -> f64;
     /// What a residual may depend on when something is missing, row by row: the remainder is tested against each.
     fn covariates(&self, recording: &Recording<Self::Stimulus>) -> Vec<Covariate>;
+    /// What was left out or is peculiar about `recording`, in words a report can show.
+    fn notes(&self, recording: &Recording<Self::Stimulus>) -> Vec<String>;
+    /// The unit a parameter has here, where mechanisms declare one in general terms.
+    fn unit(&self, declared: &str) -> String;
     /// Follows `rows` of `recording` over all lanes of `thetas`: [`Simulator::parameters`] first, then
     /// [`Simulator::initial_parameters`] of the first of these rows.
     fn rollout(

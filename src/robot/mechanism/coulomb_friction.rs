@@ -44,7 +44,7 @@ impl Law<Joint> for Friction {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{Commands, MECHANISMS};
+    use crate::robot::{Axis, Commands, MECHANISMS};
     use crate::sim2real::{Assembly, Recording, Seed, Simulator};
 
     /// A push below the friction torque moves nothing, however long it lasts; one above does, and when it ends the joint
@@ -63,7 +63,7 @@ mod tests {
         };
         let recording =
             Recording { name: "push".into(), stimulus: Commands(time.iter().map(push).collect()), measured: vec![], time };
-        let arm = Joint::new([0.11, 0.05, 0.0, 1.0], [0.0; 4]);
+        let arm = Joint::new(Axis::Rotary, [0.11, 0.05, 0.0, 1.0], [0.0; 4]);
         let form = CoulombFriction.forms(&Typical::default())[0].parameters.clone();
         let stuck = Assembly::new(arm, MECHANISMS).with_mechanism(&CoulombFriction, 0, form);
         let thetas = Thetas::single(&[0.11, 0.05, 0.0, 1.0, 0.2, 0.3, 0.0]);

@@ -30,7 +30,7 @@ pub static MECHANISMS: Registry<Joint> = &[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::Commands;
+    use crate::robot::{Axis, Commands};
     use crate::sim2real::{Measured, Recording, check_mechanism};
 
     #[test]
@@ -43,7 +43,7 @@ mod tests {
             measured: vec![Measured { channel: "position".into(), unit: "rad".into(), samples }],
             time,
         };
-        let arm = Joint::new([0.11, 0.25, 2.7, 1.0], [0.2, 0.2, 0.2, 0.0]);
+        let arm = Joint::new(Axis::Rotary, [0.11, 0.25, 2.7, 1.0], [0.2, 0.2, 0.2, 0.0]);
         for mechanism in MECHANISMS {
             check_mechanism(*mechanism, &arm, MECHANISMS, &recording).unwrap();
         }

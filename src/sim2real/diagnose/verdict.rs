@@ -185,7 +185,7 @@ fn effects<T: Twin>(
             .enumerate()
             .map(|(k, p)| {
                 let (value, std) = (findings.trued.values[at + k], findings.std[at + k]);
-                (p.name.clone().into_owned(), Estimate { value, std, unit: unit(inquiry, &p.unit) })
+                (p.name.clone().into_owned(), Estimate { value, std, unit: inquiry.twin.unit(&p.unit) })
             })
             .collect();
         at += candidate.form.parameters.len();
@@ -211,16 +211,6 @@ fn effects<T: Twin>(
     effects
 }
 
-/// The unit of a parameter; those of generic mechanisms are those of the recording's first channel.
-fn unit<T: Twin>(inquiry: &Inquiry<'_, T>, declared: &str) -> String {
-    let measured = |part: &Part<'_, T::Stimulus>| part.recording.measured.first().map(|m| m.unit.clone());
-    match declared {
-        "output" => inquiry.evidence.free_run.first().and_then(measured).unwrap_or_default(),
-        "command" => "unit of the command".to_owned(),
-        other => other.to_owned(),
-    }
-}
-
 fn parameters<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     selected: &Hypothesis<T>,
@@ -235,7 +225,7 @@ fn parameters<T: Twin>(
                 nominal: p.nominal,
                 value: findings.trued.values[k],
                 std: findings.std[k],
-                unit: p.unit.clone().into_owned(),
+                unit: inquiry.twin.unit(&p.unit),
             };
             (p.name.clone().into_owned(), change)
         })
@@ -243,7 +233,9 @@ fn parameters<T: Twin>(
 }
 
 fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> Vec<String> {
-    let mut notes = Vec::new();
+    let parts = inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out);
+    let mut notes: Vec<String> = parts.flat_map(|p| inquiry.twin.notes(p.recording)).collect();
+    notes.dedup();
     if let Some(seconds) = inquiry.evidence.window {
         notes.push(format!(
             "this plant does not forget where it started, so hypotheses were compared on windows of {seconds:.2} s, each \
