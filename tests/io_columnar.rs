@@ -1,6 +1,7 @@
 //! Parquet and Arrow columns of every type that is read, and of those that are not.
 
 #![cfg(feature = "io")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it fails")]
 
 use std::fs::File;
 use std::path::Path;
@@ -86,5 +87,35 @@ fn an_arrow_file_is_refused_wherever_it_is_cut() {
         let path = folder.path().join("a.arrow");
         std::fs::write(&path, &bytes[..cut]).unwrap();
         assert!(Table::read(&path).unwrap_err().message.starts_with("expected a whole Arrow IPC file"));
+    }
+}
+
+/// Every table below `folder`.
+fn tables(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            tables(&path, found);
+        } else if path.extension().is_some_and(|ending| ending == "csv" || ending == "parquet") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn files_that_others_wrote_are_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    if !folder.is_dir() {
+        println!("skipped: ../shared/data is absent");
+        return;
+    }
+    let mut found = Vec::new();
+    tables(&folder, &mut found);
+    assert!(!found.is_empty());
+    for path in found {
+        let table = Table::read(&path).unwrap();
+        for name in table.names() {
+            table.texts(name).or_else(|_| table.times(name, &NEW_YORK).map(|_| Vec::new())).unwrap();
+        }
     }
 }

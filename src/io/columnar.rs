@@ -108,7 +108,7 @@ fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
         let name = field.name.to_string();
         match readable(&field.dtype) {
             true => wanted.push(name.clone()),
-            false => left_out.push((name.clone(), format!("{:?}", field.dtype))),
+            false => left_out.push((name.clone(), type_name(&field.dtype))),
         }
         names.push(name);
     }
@@ -144,6 +144,12 @@ fn check_counts(reader: &mut ParquetReader<File>, mut file: File, size: u64) -> 
         }
     }
     Ok(())
+}
+
+/// The name of a type, without what is within it.
+fn type_name(kind: &ArrowDataType) -> String {
+    let name = format!("{kind:?}");
+    format!("the type {}", name.split(['(', '{']).next().unwrap_or_default().trim())
 }
 
 /// Whether columns of that type are read; the data-frame library is built without the others, and panics at them.
@@ -193,7 +199,7 @@ fn values(series: &Series) -> PolarsResult<Column> {
             Column::Naive(days.i32()?.iter().map(|v| v.and_then(midnight)).collect())
         }
         DataType::Datetime(unit, zone) => instants(series, *unit, zone.is_some())?,
-        other => Column::Other(other.to_string()),
+        other => Column::Other(format!("the type {other}")),
     })
 }
 
