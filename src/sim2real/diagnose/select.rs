@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
+use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
 use crate::sim2real::Twin;
 
@@ -19,8 +20,9 @@ const STAGES: usize = 3;
 const BEAM: usize = 3;
 /// Candidates fitted from each hypothesis of the beam.
 const FITTED: usize = 6;
-/// Candidates whose signature looks less than this like the misfit are not fitted.
-const SCREENED_OUT: f64 = 0.01;
+/// Candidates are fitted if their signature, with this many times the evidence the parent's residuals hold, could gain
+/// what acceptance asks for: once more is explained, residuals hold more evidence.
+const BENEFIT_OF_DOUBT: f64 = 4.0;
 
 /// The outcome of a selection.
 pub(super) struct Selection<T> {
@@ -68,11 +70,13 @@ fn expand<T: Twin>(inquiry: &Inquiry<'_, T>, beam: &[Hypothesis<T>], stage: usiz
     for (place, parent) in beam.iter().enumerate() {
         let mut screened = inquiry.screened(parent);
         screened.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let effective: f64 = parent.misfits.iter().map(ChannelMisfit::effective).sum();
+        let hopeful = |score: f64| -BENEFIT_OF_DOUBT * effective * (1.0 - score * score).ln() > ACCEPT;
         for (rank, one) in screened.into_iter().enumerate() {
             let mut set: Vec<usize> = parent.set();
             set.push(one.number);
             set.sort_unstable();
-            let fitted = rank < FITTED && one.score > SCREENED_OUT && !sets.contains(&set);
+            let fitted = rank < FITTED && one.score > 0.0 && hopeful(one.score) && !sets.contains(&set);
             if fitted {
                 sets.push(set);
             }

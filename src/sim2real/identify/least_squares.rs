@@ -11,6 +11,10 @@ use crate::sim2real::Simulator;
 /// Directions in which the data move the parameters less than this part of the strongest count as not determined.
 const RANK_TOLERANCE: f64 = 1e-7;
 
+/// A fit ends when a step would lower the objective by less than this part of it: a thousandth of what the weakest
+/// evidence that counts is worth.
+const CONVERGED: f64 = 1e-6;
+
 /// What a fit found.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -58,7 +62,8 @@ pub fn fit_smooth<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &
             values.iter_mut().zip(step).for_each(|(value, step)| *value += step);
         }
         let misfit = (foreseen / rows.max(1) as f64).sqrt().max(1.0);
-        let tempered = (misfit / state.misfit).ln().abs();
+        let held = state.initial.iter().flatten().any(|p| p.prior.is_some());
+        let tempered = if held { (misfit / state.misfit).ln().abs() } else { 0.0 };
         state.misfit = misfit;
         if steps.iter().all(Vec::is_empty) || (measured(&theta, &state).0 / foreseen - 1.0).abs() < 1e-3 && tempered < 0.7 {
             break;
@@ -80,8 +85,7 @@ fn descend<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usiz
     let point = DVector::from_iterator(free.len(), free.iter().zip(&maps).map(|(k, map)| map.free(theta[*k])));
     let mut target = Target { problem, state, free, maps, point: point.clone(), theta, cached: None };
     target.set_params(&point);
-    let settings =
-        LevenbergMarquardt::new().with_ftol(1e-7).with_xtol(1e-7).with_gtol(1e-10).with_stepbound(1.0).with_patience(20);
+    let settings = LevenbergMarquardt::new().with_ftol(CONVERGED).with_xtol(1e-6).with_stepbound(1.0).with_patience(10);
     settings.minimize(target).0.theta
 }
 
