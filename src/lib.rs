@@ -8,3 +8,6 @@
 
 pub mod market;
 pub mod sim2real;
+#[cfg(feature = "io")]
+#[path = "../strategies/mod.rs"]
+pub mod strategies;

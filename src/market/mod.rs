@@ -1,15 +1,40 @@
 //! Markets: what is traded, the backtest that trades it, and `execution`, the plant every order meets.
 
+mod backtest;
+mod bar;
+mod blotter;
 mod book;
+mod check;
+mod daily;
 mod execution;
+mod feed;
+mod history;
 mod instrument;
+mod ledger;
 pub mod mechanism;
+pub mod metric;
+mod money;
 mod order;
 mod order_log;
+mod quote;
+mod strategy;
+mod venue;
 
+pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Session, Settings};
+pub use bar::{Bar, Stamp, common_spacing};
+pub use blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
 pub use book::{Book, Level};
+pub use check::{check_strategy, check_strategy_on};
+pub use daily::Daily;
 pub use execution::{Execution, ExecutionEffect, Met, Report};
+pub use feed::Feed;
+pub use history::{History, HistoryError};
 pub use instrument::Instrument;
+pub use ledger::{Ledger, Position, Trade};
 pub use mechanism::MECHANISMS;
+pub use money::{Cash, Increments, MoneyError, Price, Quantity};
 pub use order::{InFlight, Posted, Side};
 pub use order_log::OrderLog;
+pub use quote::{Quote, QuoteSlice, Quotes};
+pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
+pub use venue::{Answer, Reference, Venue};
