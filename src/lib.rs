@@ -6,6 +6,8 @@
 #![deny(missing_docs)]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "io")]
+pub mod io;
 pub mod market;
 pub mod sim2real;
 #[cfg(feature = "io")]

@@ -1,0 +1,191 @@
+//! Parquet and Arrow files; the only place, with [`write`](super::write), that knows the data-frame library.
+
+use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use chrono::{DateTime, NaiveDateTime};
+use polars::prelude::{
+    ArrowDataType, DataFrame, DataType, IpcReader, ParquetReader, PolarsResult, SerReader, Series, TimeUnit as PolarsUnit,
+    TimeZone,
+};
+
+use super::error::InputError;
+
+/// The values of one column, in the few types that recordings are made of.
+pub(super) enum Column {
+    Floats(Vec<Option<f64>>),
+    Integers(Vec<Option<i64>>),
+    Booleans(Vec<Option<bool>>),
+    Texts(Vec<Option<String>>),
+    /// Nanoseconds since the Unix epoch, in UTC.
+    Instants(Vec<Option<i64>>),
+    /// Times without a zone.
+    Naive(Vec<Option<NaiveDateTime>>),
+    /// A type of which no recording is made, by its name.
+    Other(String),
+}
+
+/// A table read from Parquet or Arrow.
+pub(super) struct ColumnarFile {
+    frame: DataFrame,
+    /// All columns of the file, also those the frame leaves out.
+    names: Vec<String>,
+    /// Columns of types that are not read, and these types.
+    left_out: Vec<(String, String)>,
+}
+
+/// The two kinds of columnar file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Container {
+    Parquet,
+    Arrow,
+}
+
+impl ColumnarFile {
+    /// Reads `file`, which was opened from `path`.
+    ///
+    /// # Errors
+    /// A file that is empty, truncated or corrupt, and one without rows.
+    pub(super) fn read(path: &Path, file: File, container: Container) -> Result<Self, InputError> {
+        let kind = match container {
+            Container::Parquet => "Parquet",
+            Container::Arrow => "Arrow IPC",
+        };
+        let corrupt = |reason: &str| {
+            InputError::new(path, format!("expected a whole {kind} file ({})", first_line(reason)))
+                .hint("the file is truncated, corrupt or of another format: copy or write it again")
+        };
+        // The decoders panic on some corrupt bytes; a recording must not take the process with it.
+        let table = match catch_unwind(AssertUnwindSafe(|| load(file, container))) {
+            Ok(result) => result.map_err(|error| corrupt(&error.to_string()))?,
+            Err(_) => return Err(corrupt("its contents contradict each other")),
+        };
+        if table.frame.height() == 0 {
+            return Err(InputError::new(path, "the file has columns but no rows")
+                .hint("was the recording cut off before its first sample?"));
+        }
+        Ok(table)
+    }
+
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    pub(super) fn rows(&self) -> usize {
+        self.frame.height()
+    }
+
+    /// The values of the column of that name, which the file must have.
+    pub(super) fn column(&self, name: &str) -> Column {
+        if let Some((_, kind)) = self.left_out.iter().find(|(left_out, _)| left_out == name) {
+            return Column::Other(kind.clone());
+        }
+        let series = self.frame.column(name).map(|column| column.as_materialized_series());
+        match series.and_then(values) {
+            Ok(column) => column,
+            Err(error) => Column::Other(first_line(&error.to_string())),
+        }
+    }
+}
+
+fn first_line(text: &str) -> String {
+    text.lines().next().unwrap_or_default().to_owned()
+}
+
+fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
+    let mut parquet = None;
+    let mut arrow = None;
+    let schema = match container {
+        Container::Parquet => parquet.insert(ParquetReader::new(file)).schema()?,
+        Container::Arrow => arrow.insert(IpcReader::new(file)).schema()?,
+    };
+    let (mut names, mut wanted, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+    for field in schema.iter_values() {
+        let name = field.name.to_string();
+        match readable(&field.dtype) {
+            true => wanted.push(name.clone()),
+            false => left_out.push((name.clone(), format!("{:?}", field.dtype))),
+        }
+        names.push(name);
+    }
+    let frame = match (parquet, arrow) {
+        (Some(reader), _) => reader.with_columns(Some(wanted)).finish()?,
+        (None, Some(reader)) => reader.with_columns(Some(wanted)).finish()?,
+        (None, None) => DataFrame::empty(),
+    };
+    Ok(ColumnarFile { frame, names, left_out })
+}
+
+/// Whether columns of that type are read; the data-frame library is built without the others, and panics at them.
+fn readable(kind: &ArrowDataType) -> bool {
+    match kind {
+        ArrowDataType::Timestamp(_, zone) => TimeZone::opt_try_new(zone.clone()).is_ok(),
+        ArrowDataType::Dictionary(_, value, _) => {
+            matches!(**value, ArrowDataType::Utf8 | ArrowDataType::LargeUtf8 | ArrowDataType::Utf8View)
+        }
+        _ => matches!(
+            kind,
+            ArrowDataType::Null
+                | ArrowDataType::Boolean
+                | ArrowDataType::Int32
+                | ArrowDataType::Int64
+                | ArrowDataType::UInt32
+                | ArrowDataType::UInt64
+                | ArrowDataType::Float32
+                | ArrowDataType::Float64
+                | ArrowDataType::Utf8
+                | ArrowDataType::LargeUtf8
+                | ArrowDataType::Utf8View
+                | ArrowDataType::Date32
+                | ArrowDataType::Date64
+        ),
+    }
+}
+
+fn values(series: &Series) -> PolarsResult<Column> {
+    Ok(match series.dtype() {
+        DataType::Float64 => Column::Floats(series.f64()?.iter().collect()),
+        DataType::Float32 => Column::Floats(series.f32()?.iter().map(|v| v.map(f64::from)).collect()),
+        DataType::Int32 | DataType::Int64 | DataType::UInt32 | DataType::UInt64 => {
+            Column::Integers(series.strict_cast(&DataType::Int64)?.i64()?.iter().collect())
+        }
+        DataType::Boolean => Column::Booleans(series.bool()?.iter().collect()),
+        DataType::String => Column::Texts(series.str()?.iter().map(|v| v.map(str::to_owned)).collect()),
+        DataType::Categorical(..) | DataType::Enum(..) => {
+            let texts = series.cast(&DataType::String)?;
+            Column::Texts(texts.str()?.iter().map(|v| v.map(str::to_owned)).collect())
+        }
+        DataType::Null => Column::Texts(vec![None; series.len()]),
+        DataType::Date => {
+            // Days since the epoch.
+            let days = series.cast(&DataType::Int32)?;
+            let midnight = |day: i32| DateTime::from_timestamp(i64::from(day) * 86_400, 0).map(|t| t.naive_utc());
+            Column::Naive(days.i32()?.iter().map(|v| v.and_then(midnight)).collect())
+        }
+        DataType::Datetime(unit, zone) => instants(series, *unit, zone.is_some())?,
+        other => Column::Other(other.to_string()),
+    })
+}
+
+fn instants(series: &Series, unit: PolarsUnit, zoned: bool) -> PolarsResult<Column> {
+    let per_unit = match unit {
+        PolarsUnit::Nanoseconds => 1,
+        PolarsUnit::Microseconds => 1_000,
+        PolarsUnit::Milliseconds => 1_000_000,
+    };
+    let counts = series.to_physical_repr();
+    let counts = counts.i64()?;
+    let mut nanoseconds = Vec::with_capacity(counts.len());
+    for count in counts.iter() {
+        match count.map(|c: i64| c.checked_mul(per_unit)) {
+            Some(None) => return Ok(Column::Other("a time outside the years 1677 to 2262".to_owned())),
+            value => nanoseconds.push(value.flatten()),
+        }
+    }
+    if zoned {
+        return Ok(Column::Instants(nanoseconds));
+    }
+    let naive = |ns: i64| DateTime::from_timestamp_nanos(ns).naive_utc();
+    Ok(Column::Naive(nanoseconds.into_iter().map(|v| v.map(naive)).collect()))
+}

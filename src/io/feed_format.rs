@@ -1,0 +1,104 @@
+//! How market data files are written, as far as a document must say it.
+
+use chrono_tz::{TZ_VARIANTS, Tz};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
+
+use super::document::{Document, HINT};
+use super::error::{InputError, hint_among};
+use super::source::open;
+use super::table::Renames;
+use super::time_format::{TimeFormat, TimeUnit};
+
+/// What the time of a bar is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stamp {
+    /// The bar's first instant.
+    Open,
+    /// The instant the bar is complete.
+    Close,
+}
+
+impl Stamp {
+    /// The word for it in documents.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Open => "open",
+            Self::Close => "close",
+        }
+    }
+}
+
+/// How market data files are written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeedFormat {
+    /// What the time of a bar is; bars have it always, other data never need it.
+    pub stamp: Option<Stamp>,
+    /// Unit and zone of times.
+    pub time: TimeFormat,
+    /// What one unit of a price in the file is worth [currency].
+    pub price_scale: f64,
+    /// Columns that are named otherwise.
+    pub columns: Renames,
+}
+
+impl Default for FeedFormat {
+    fn default() -> Self {
+        Self { stamp: None, time: TimeFormat::default(), price_scale: 1.0, columns: Renames::new() }
+    }
+}
+
+impl FeedFormat {
+    /// The format that the optional keys of a section say.
+    pub(super) fn of(
+        stamp: Option<Stamp>,
+        zone: Option<Tz>,
+        unit: Option<TimeUnit>,
+        price_scale: Option<f64>,
+        columns: Renames,
+    ) -> Self {
+        let time = TimeFormat { unit: unit.unwrap_or_default(), zone: zone.unwrap_or(Tz::UTC) };
+        Self { stamp, time, price_scale: price_scale.unwrap_or(1.0), columns }
+    }
+
+    /// Holds the section at `keys`, which may name bars, to what can be held without reading them.
+    pub(super) fn check(&self, document: &Document, keys: &[&str], bars: bool) -> Result<(), InputError> {
+        if bars && self.stamp.is_none() {
+            let error = document.error(keys, "bars need a `stamp`, which is missing");
+            return Err(error.hint("say what a bar's time is: stamp = \"open\" or stamp = \"close\" of the bar"));
+        }
+        if !self.price_scale.is_finite() || self.price_scale <= 0.0 {
+            let keys: Vec<&str> = keys.iter().copied().chain(["price_scale"]).collect();
+            return Err(document.error(&keys, "expected a finite number greater than 0").found(self.price_scale));
+        }
+        Ok(())
+    }
+}
+
+/// Holds the file that stands at `keys` of a document to exist.
+pub(super) fn check_file(document: &Document, keys: &[&str], named: &str) -> Result<(), InputError> {
+    open(&document.resolve(named)).map(drop).map_err(|error| {
+        document
+            .error(keys, format!("names the file {named}, but {}", error.message))
+            .maybe_hint(error.hint.or_else(|| Some("paths start from the folder of this document".to_owned())))
+    })
+}
+
+/// Reads a time zone of the IANA database by its name.
+pub(super) fn zone<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Tz>, D::Error> {
+    let word = String::deserialize(deserializer)?;
+    if let Ok(zone) = word.parse() {
+        return Ok(Some(zone));
+    }
+    let names: Vec<&str> = TZ_VARIANTS.iter().map(|zone| zone.name()).collect();
+    let city = format!("/{}", word.to_lowercase().replace(' ', "_"));
+    let hint = match names.iter().find(|name| name.to_lowercase().ends_with(&city)) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None => hint_among(&word, &names).filter(|hint| hint.starts_with("did")).unwrap_or_else(|| {
+            "zones are called as in the IANA database: \"America/New_York\", \"Europe/London\", \"UTC\"".to_owned()
+        }),
+    };
+    Err(D::Error::custom(format!("unknown time zone `{word}`{HINT}{hint}")))
+}

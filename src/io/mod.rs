@@ -1,0 +1,36 @@
+//! Files: the only file access below the command line. Reads and writes tables and TOML documents; what their rows
+//! and keys mean is the domains' business: nothing here knows a joint or an order.
+
+mod check;
+mod columnar;
+mod csv;
+mod document;
+mod error;
+mod feed_format;
+mod instrument_entry;
+mod output_folder;
+mod output_table;
+mod quantity;
+mod relative_path;
+mod run_file;
+mod source;
+mod table;
+mod time_format;
+mod trajectory;
+mod twin_file;
+mod unit;
+
+pub use check::{Increase, check_increasing, check_not_negative, check_positive};
+pub use document::{Document, read_toml};
+pub use error::{InputError, Place, did_you_mean, hint_among, listed};
+pub use feed_format::{FeedFormat, Stamp};
+pub use instrument_entry::InstrumentEntry;
+pub use output_folder::{OutputFolder, Overwrite, write_file, write_table};
+pub use output_table::{OutputTable, Values};
+pub use quantity::{DEFAULT_UNCERTAINTY, MechanismEntry, Quantity};
+pub use run_file::{DataEntry, FeedKind, RunFile, RunSection};
+pub use table::{Renames, Table};
+pub use time_format::{TimeFormat, TimeUnit};
+pub use trajectory::{Need, TIME_COLUMN, TrajectoryTable, read_trajectory};
+pub use twin_file::{AssumedPrice, Assumptions, ChannelEntry, MarketFiles, TwinFile};
+pub use unit::{UnitMismatch, check_unit};

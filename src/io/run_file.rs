@@ -1,0 +1,302 @@
+//! RUN.toml: what a backtest or a paper run is made of.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::marker::PhantomData;
+use std::path::{Path, PathBuf};
+
+use chrono::DateTime;
+use chrono_tz::Tz;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{DeserializeOwned, DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+
+use super::document::{Document, HINT};
+use super::error::{InputError, hint_among};
+use super::feed_format::{FeedFormat, Stamp, check_file, zone};
+use super::instrument_entry::{InstrumentEntry, check_instruments};
+use super::quantity::{MechanismEntry, check_mechanisms};
+use super::table::Renames;
+use super::time_format::TimeUnit;
+use crate::sim2real::Timestamp;
+
+/// A run, as its document declares it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunFile {
+    document: Document,
+    /// `[run]`.
+    pub run: RunSection,
+    /// `[[instrument]]`.
+    pub instruments: Vec<InstrumentEntry>,
+    /// `[[data]]`.
+    pub data: Vec<DataEntry>,
+    /// `kind` of `[strategy]`; its other keys are read by [`strategy_settings`](Self::strategy_settings).
+    pub strategy: String,
+    /// `[[mechanism]]`: what stands between decision and fill.
+    pub mechanisms: Vec<MechanismEntry>,
+}
+
+/// `[run]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSection {
+    /// Seed of all randomness.
+    pub seed: u64,
+    /// Cash at the start [currency].
+    pub cash: f64,
+    /// Currency of cash and prices.
+    pub currency: String,
+    /// The first instant of data that counts; none for all from the first.
+    #[serde(default, deserialize_with = "instant")]
+    pub start: Option<Timestamp>,
+    /// The instant from which on data no longer count; none for all to the last.
+    #[serde(default, deserialize_with = "instant")]
+    pub end: Option<Timestamp>,
+}
+
+/// What a data file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FeedKind {
+    /// Bars: open, high, low, close and volume of an interval.
+    Bars,
+    /// Quotes: best bid and ask, and deeper levels.
+    Quotes,
+    /// Trades.
+    Trades,
+    /// Changes of an order book.
+    Book,
+}
+
+impl FeedKind {
+    /// The word for it in documents.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Bars => "bars",
+            Self::Quotes => "quotes",
+            Self::Trades => "trades",
+            Self::Book => "book",
+        }
+    }
+}
+
+/// `[[data]]`: a file of market data of one instrument.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DataEntry {
+    /// Symbol of the instrument.
+    pub symbol: String,
+    /// What the file holds.
+    pub kind: FeedKind,
+    /// The file.
+    pub path: PathBuf,
+    /// How it is written.
+    pub format: FeedFormat,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RunTable {
+    run: RunSection,
+    #[serde(default)]
+    instrument: Vec<InstrumentEntry>,
+    #[serde(default)]
+    data: Vec<DataTable>,
+    strategy: StrategyKind,
+    #[serde(default)]
+    mechanism: Vec<MechanismEntry>,
+}
+
+#[derive(Deserialize)]
+struct StrategyKind {
+    kind: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DataTable {
+    symbol: String,
+    bars: Option<String>,
+    quotes: Option<String>,
+    trades: Option<String>,
+    book: Option<String>,
+    stamp: Option<Stamp>,
+    #[serde(default, deserialize_with = "zone")]
+    zone: Option<Tz>,
+    price_scale: Option<f64>,
+    time_unit: Option<TimeUnit>,
+    #[serde(default)]
+    columns: Renames,
+}
+
+impl RunFile {
+    /// Reads RUN.toml, and holds it to what can be held without reading the files it names; these must exist.
+    ///
+    /// # Errors
+    /// As [`read_toml`](super::read_toml); values out of their range; instruments and data that do not belong together.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
+        let run = Self::parse(Document::read(path)?)?;
+        for (index, data) in run.data.iter().enumerate() {
+            check_file(&run.document, &["data", &index.to_string(), data.kind.word()], &data.path.to_string_lossy())?;
+        }
+        Ok(Self {
+            data: run.data.into_iter().map(|d| DataEntry { path: run.document.resolve(&d.path), ..d }).collect(),
+            ..run
+        })
+    }
+
+    /// The run of a document; the files it names are neither looked for nor resolved.
+    fn parse(document: Document) -> Result<Self, InputError> {
+        let RunTable { run, instrument, data, strategy, mechanism } = document.parse()?;
+        if !run.cash.is_finite() || run.cash < 0.0 {
+            let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
+            return Err(error.found(run.cash));
+        }
+        if let (Some(start), Some(end)) = (run.start, run.end)
+            && start >= end
+        {
+            return Err(document.error(&["run", "end"], format!("expected an end after the start, {start}")).found(end));
+        }
+        check_instruments(&document, &instrument)?;
+        check_mechanisms(&document, &mechanism)?;
+        let data = data
+            .into_iter()
+            .enumerate()
+            .map(|(index, table)| data_entry(&document, &index.to_string(), table, &instrument))
+            .collect::<Result<Vec<_>, _>>()?;
+        if data.is_empty() {
+            return Err(document.error(&[], "the run names no data").hint("add a [[data]] section"));
+        }
+        let mut seen = BTreeSet::new();
+        if let Some(index) = data.iter().position(|d| !seen.insert((d.symbol.clone(), d.kind))) {
+            let message = format!("there are {} of `{}` already", data[index].kind.word(), data[index].symbol);
+            return Err(document.error(&["data", &index.to_string()], message).hint("join the files into one"));
+        }
+        Ok(Self { document, run, instruments: instrument, data, strategy: strategy.kind, mechanisms: mechanism })
+    }
+
+    /// The document.
+    #[must_use]
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+
+    /// The keys of `[strategy]`, other than `kind`, as the settings of a strategy.
+    ///
+    /// # Errors
+    /// Whatever `T` refuses, with line and column.
+    pub fn strategy_settings<T: DeserializeOwned>(&self) -> Result<T, InputError> {
+        self.document.parse::<OnlyStrategy<T>>().map(|only| only.strategy.0).map_err(|error| {
+            // A key that was read to be left out or passed on no longer knows its place.
+            let unknown = error.message.strip_prefix("unknown key `").and_then(|rest| rest.strip_suffix('`'));
+            match unknown.map(|key| self.document.error(&["strategy", key], "").place) {
+                Some(place) => error.at(place),
+                None => error,
+            }
+        })
+    }
+
+    /// An error about the key at `keys`, such as `["strategy", "kind"]`.
+    #[must_use]
+    pub fn error(&self, keys: &[&str], message: impl Into<String>) -> InputError {
+        self.document.error(keys, message)
+    }
+}
+
+fn data_entry(
+    document: &Document,
+    number: &str,
+    table: DataTable,
+    instruments: &[InstrumentEntry],
+) -> Result<DataEntry, InputError> {
+    let keys = ["data", number];
+    let kinds = [
+        (FeedKind::Bars, table.bars),
+        (FeedKind::Quotes, table.quotes),
+        (FeedKind::Trades, table.trades),
+        (FeedKind::Book, table.book),
+    ];
+    let mut named = kinds.into_iter().filter_map(|(kind, path)| path.map(|path| (kind, path)));
+    let (Some((kind, path)), None) = (named.next(), named.next()) else {
+        return Err(document
+            .error(&keys, "expected exactly one of `bars`, `quotes`, `trades` and `book`")
+            .hint("a second file of the same instrument has a [[data]] section of its own"));
+    };
+    if !instruments.iter().any(|i| i.symbol == table.symbol) {
+        let symbols: Vec<&str> = instruments.iter().map(|i| i.symbol.as_str()).collect();
+        let hint = hint_among(&table.symbol, &symbols).unwrap_or_else(|| "add an [[instrument]] section".to_owned());
+        let message = format!("there is no [[instrument]] with the symbol `{}`", table.symbol);
+        return Err(document.error(&["data", number, "symbol"], message).hint(hint));
+    }
+    let format = FeedFormat::of(table.stamp, table.zone, table.time_unit, table.price_scale, table.columns);
+    format.check(document, &keys, kind == FeedKind::Bars)?;
+    Ok(DataEntry { symbol: table.symbol, kind, path: path.into(), format })
+}
+
+/// Reads an instant: RFC 3339, as a text or as TOML writes it by itself.
+fn instant<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Timestamp>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Written {
+        Text(String),
+        Toml(toml::value::Datetime),
+    }
+    let refuse = |found: &str| {
+        D::Error::custom(format!(
+            "invalid value: {found:?}, expected an instant{HINT}such as \"2024-03-08T14:30:00Z\" (RFC 3339)"
+        ))
+    };
+    let text = match Written::deserialize(deserializer).map_err(|_| refuse("no text"))? {
+        Written::Text(text) => text,
+        Written::Toml(instant) => instant.to_string(),
+    };
+    let instant = DateTime::parse_from_rfc3339(&text).ok().and_then(|t| t.timestamp_nanos_opt());
+    instant.map(|ns| Some(Timestamp(ns))).ok_or_else(|| refuse(&text))
+}
+
+#[derive(Deserialize)]
+#[serde(bound = "T: Deserialize<'de>")]
+struct OnlyStrategy<T> {
+    strategy: Settings<T>,
+}
+
+/// A `T` read from a table without its key `kind`.
+struct Settings<T>(T);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Settings<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Table<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Table<T> {
+            type Value = Settings<T>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Settings<T>, A::Error> {
+                T::deserialize(MapAccessDeserializer::new(WithoutKind(map))).map(Settings)
+            }
+        }
+        deserializer.deserialize_map(Table(PhantomData))
+    }
+}
+
+struct WithoutKind<A>(A);
+
+impl<'de, A: MapAccess<'de>> MapAccess<'de> for WithoutKind<A> {
+    type Error = A::Error;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, A::Error> {
+        // The key is read as text first: a seed is spent by the key it reads.
+        loop {
+            let Some(key) = self.0.next_key::<String>()? else { return Ok(None) };
+            if key != "kind" {
+                return seed.deserialize(serde::de::value::StringDeserializer::new(key)).map(Some);
+            }
+            self.0.next_value::<IgnoredAny>()?;
+        }
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, A::Error> {
+        self.0.next_value_seed(seed)
+    }
+}

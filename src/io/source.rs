@@ -1,0 +1,78 @@
+//! Files as bytes: which format a name's ending says, and what is wrong with files that cannot be opened.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::columnar::Container;
+use super::error::{InputError, did_you_mean};
+
+/// The format that the ending of a name says.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Ending {
+    Csv,
+    CsvGz,
+    Columnar(Container),
+}
+
+impl Ending {
+    pub(super) fn of(path: &Path) -> Result<Self, InputError> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        let endings = [
+            (".csv", Self::Csv),
+            (".csv.gz", Self::CsvGz),
+            (".parquet", Self::Columnar(Container::Parquet)),
+            (".arrow", Self::Columnar(Container::Arrow)),
+            (".ipc", Self::Columnar(Container::Arrow)),
+            (".feather", Self::Columnar(Container::Arrow)),
+        ];
+        let known = endings.into_iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, ending)| ending);
+        match known {
+            Some(ending) => Ok(ending),
+            // A missing file or a folder is the better thing to say.
+            None => Err(open(path).err().unwrap_or_else(|| {
+                InputError::new(path, "the ending of the name says no format that is read")
+                    .hint("tables are .csv, .csv.gz, .parquet, .arrow, .ipc or .feather")
+            })),
+        }
+    }
+}
+
+/// Opens a file that exists and is no folder.
+pub(super) fn open(path: &Path) -> Result<File, InputError> {
+    if path.is_dir() {
+        return Err(InputError::new(path, "expected a file, found a folder").hint("name a file in it"));
+    }
+    File::open(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => InputError::new(path, "there is no such file").maybe_hint(nearest_file(path)),
+        _ => InputError::new(path, format!("cannot be opened ({error})")),
+    })
+}
+
+/// A hint for a missing file: the one in its folder that may be meant, or that the folder is missing too.
+fn nearest_file(path: &Path) -> Option<String> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return Some(format!("there is no folder {} either", folder.display()));
+    }
+    let mut names: Vec<String> =
+        std::fs::read_dir(folder).ok()?.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
+    names.sort();
+    let meant = did_you_mean(&path.file_name()?.to_string_lossy(), &names)?;
+    Some(format!("did you mean {}?", folder.join(meant).display()))
+}
+
+/// All bytes of a file.
+pub(super) fn bytes(path: &Path, mut file: impl Read) -> Result<Vec<u8>, InputError> {
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(|error| InputError::new(path, format!("cannot be read ({error})")))?;
+    Ok(bytes)
+}
+
+/// All bytes of a file, decompressed.
+pub(super) fn unzip(path: &Path, file: File) -> Result<Vec<u8>, InputError> {
+    bytes(path, flate2::read::MultiGzDecoder::new(file)).map_err(|error| {
+        InputError::new(path, format!("expected a whole gzip file ({})", error.message))
+            .hint("the file is truncated, corrupt or not compressed: copy or write it again")
+    })
+}

@@ -1,0 +1,359 @@
+//! A table: named columns read from a file, with errors that say where.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::columnar::{Column, ColumnarFile};
+use super::csv::CsvText;
+use super::error::{InputError, Place, did_you_mean, hint_among, listed};
+use super::source::{Ending, bytes, open, unzip};
+use super::time_format::{NotATime, TimeFormat, as_integer};
+use crate::sim2real::Timestamp;
+
+/// Where a file's names are not the contract's: the contract's name, and the file's.
+pub type Renames = BTreeMap<String, String>;
+
+/// A table as it was read from a file: rows in the file's order, columns by name.
+///
+/// Columns are converted when they are asked for, so columns that nobody asks for may hold anything.
+pub struct Table {
+    path: PathBuf,
+    renames: Renames,
+    body: Body,
+}
+
+enum Body {
+    Csv(CsvText),
+    Columnar(ColumnarFile),
+}
+
+impl std::fmt::Debug for Table {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Table({}, {} rows of {:?})", self.path.display(), self.rows(), self.names())
+    }
+}
+
+impl Table {
+    /// Reads a `.csv`, `.csv.gz`, `.parquet`, `.arrow`, `.ipc` or `.feather` file.
+    ///
+    /// # Errors
+    /// A file that is missing, empty, truncated, corrupt, without rows or of an unknown ending; rows of different
+    /// lengths; two columns of one name.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
+        Self::read_with(path, &Renames::new())
+    }
+
+    /// Reads a file whose columns are named otherwise; errors speak the file's names.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), and a rename of a column the file does not have.
+    pub fn read_with(path: impl AsRef<Path>, renames: &Renames) -> Result<Self, InputError> {
+        let path = path.as_ref();
+        let body = match Ending::of(path)? {
+            Ending::Csv => Body::Csv(CsvText::parse(path, bytes(path, open(path)?)?)?),
+            Ending::CsvGz => Body::Csv(CsvText::parse(path, unzip(path, open(path)?)?)?),
+            Ending::Columnar(container) => Body::Columnar(ColumnarFile::read(path, open(path)?, container)?),
+        };
+        let table = Self { path: path.to_path_buf(), renames: renames.clone(), body };
+        let own = table.own_names();
+        if let Some(name) = own.iter().enumerate().find_map(|(k, name)| own[..k].contains(name).then_some(name)) {
+            return Err(InputError::new(path, format!("two columns are named `{name}`")).hint("rename or drop one of them"));
+        }
+        for (name, file_name) in renames {
+            if !own.contains(file_name) {
+                return Err(table.no_column(file_name).hint(format!(
+                    "`columns` says that `{name}` is here called `{file_name}`; {}",
+                    hint_among(file_name, own).unwrap_or_default()
+                )));
+            }
+        }
+        Ok(table)
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Number of data rows; at least 1.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        match &self.body {
+            Body::Csv(csv) => csv.rows(),
+            Body::Columnar(file) => file.rows(),
+        }
+    }
+
+    /// Names of the columns, renamed where `columns` says so, in the file's order.
+    #[must_use]
+    pub fn names(&self) -> Vec<&str> {
+        let mut names = Vec::new();
+        for own in self.own_names() {
+            let before = names.len();
+            names.extend(self.renames.iter().filter(|(_, file_name)| *file_name == own).map(|(name, _)| name.as_str()));
+            // A rename hides the column that has its name by itself.
+            if names.len() == before && !self.renames.contains_key(own) {
+                names.push(own);
+            }
+        }
+        names
+    }
+
+    /// Whether there is a column of that name.
+    #[must_use]
+    pub fn has(&self, name: &str) -> bool {
+        self.own_names().iter().any(|own| own == self.own_name(name))
+    }
+
+    /// Holds the left sides of `columns = { … }` to the names that mean something for this file.
+    ///
+    /// # Errors
+    /// A rename to a name that is none of `meaningful`.
+    pub fn check_renames(&self, meaningful: &[&str]) -> Result<(), InputError> {
+        match self.renames.keys().find(|name| !meaningful.contains(&name.as_str())) {
+            None => Ok(()),
+            Some(name) => Err(InputError::new(&self.path, format!("`columns` renames to `{name}`, which nothing reads"))
+                .maybe_hint(hint_among(name, meaningful))),
+        }
+    }
+
+    /// A column of numbers; `None` where the cell is empty, null or NaN. Integers are converted.
+    ///
+    /// # Errors
+    /// A missing column, a text, an infinity.
+    pub fn floats(&self, name: &str) -> Result<Vec<Option<f64>>, InputError> {
+        match self.column(name)? {
+            Cells::Text(texts) => texts
+                .enumerate()
+                .map(|(row, text)| number(&text).map_err(|e| self.cell_error(name, row, e, &text)))
+                .collect(),
+            Cells::Typed(Column::Floats(values)) => values
+                .into_iter()
+                .enumerate()
+                .map(|(row, value)| match value {
+                    Some(v) if v.is_infinite() => Err(self.error(name, row, INFINITE.0).found(v).hint(INFINITE.1)),
+                    value => Ok(value.filter(|v| !v.is_nan())),
+                })
+                .collect(),
+            Cells::Typed(Column::Integers(values)) => Ok(values.into_iter().map(|v| v.map(|v| v as f64)).collect()),
+            Cells::Typed(other) => Err(self.wrong_type(name, "numbers", &other)),
+        }
+    }
+
+    /// A column of numbers without holes.
+    ///
+    /// # Errors
+    /// As [`floats`](Self::floats), and a cell that is empty, null or NaN.
+    pub fn floats_complete(&self, name: &str) -> Result<Vec<f64>, InputError> {
+        self.complete(name, self.floats(name)?, "a number")
+    }
+
+    /// A column of integers; `None` where the cell is empty or null. Numbers written as `1.0` are integers too.
+    ///
+    /// # Errors
+    /// A missing column, a text, a fraction, a number beyond 64 bits.
+    pub fn integers(&self, name: &str) -> Result<Vec<Option<i64>>, InputError> {
+        match self.column(name)? {
+            Cells::Text(texts) => texts
+                .enumerate()
+                .map(|(row, text)| integer(&text).map_err(|e| self.cell_error(name, row, e, &text)))
+                .collect(),
+            Cells::Typed(Column::Integers(values)) => Ok(values),
+            Cells::Typed(Column::Floats(values)) => values
+                .into_iter()
+                .enumerate()
+                .map(|(row, value)| match value.filter(|v| !v.is_nan()) {
+                    None => Ok(None),
+                    Some(v) => as_integer(v).map(Some).ok_or_else(|| self.error(name, row, NO_INTEGER.0).found(v)),
+                })
+                .collect(),
+            Cells::Typed(other) => Err(self.wrong_type(name, "integers", &other)),
+        }
+    }
+
+    /// A column of texts; `None` where the cell is empty or null. Integers, such as order ids, and booleans are
+    /// converted, and so are floats.
+    ///
+    /// # Errors
+    /// A missing column, or one of times.
+    pub fn texts(&self, name: &str) -> Result<Vec<Option<String>>, InputError> {
+        let filled = |text: &String| !text.is_empty();
+        Ok(match self.column(name)? {
+            Cells::Text(texts) => texts.map(|text| Some(text.into_owned()).filter(filled)).collect(),
+            Cells::Typed(Column::Integers(values)) => values.into_iter().map(|v| v.map(|v| v.to_string())).collect(),
+            Cells::Typed(Column::Booleans(values)) => values.into_iter().map(|v| v.map(|v| v.to_string())).collect(),
+            Cells::Typed(Column::Floats(values)) => values.into_iter().map(|v| v.map(|v| v.to_string())).collect(),
+            Cells::Typed(other) => return Err(self.wrong_type(name, "texts", &other)),
+        })
+    }
+
+    /// A column of texts without holes.
+    ///
+    /// # Errors
+    /// As [`texts`](Self::texts), and an empty cell.
+    pub fn texts_complete(&self, name: &str) -> Result<Vec<String>, InputError> {
+        self.complete(name, self.texts(name)?, "a text")
+    }
+
+    /// A column of times without holes.
+    ///
+    /// # Errors
+    /// As [`times_with_holes`](Self::times_with_holes), and an empty cell.
+    pub fn times(&self, name: &str, format: &TimeFormat) -> Result<Vec<Timestamp>, InputError> {
+        self.complete(name, self.times_with_holes(name, format)?, "a time")
+    }
+
+    /// A column of times, as `format` reads them; `None` where the cell is empty or null. Columns that are times by
+    /// type keep the unit and zone the file gives them, and where it gives no zone are in the `format`'s.
+    ///
+    /// # Errors
+    /// A missing column, a cell that is no time, a local time that the clocks skip, a time outside 1677..2262.
+    pub fn times_with_holes(&self, name: &str, format: &TimeFormat) -> Result<Vec<Option<Timestamp>>, InputError> {
+        let explain = |row: usize, why: NotATime| self.error(name, row, why.message()).hint(why.hint());
+        match self.column(name)? {
+            Cells::Text(texts) => each(texts.map(|text| Some(text).filter(|t| !t.is_empty())), |row, text| {
+                format.text(&text).map_err(|why| explain(row, why).found_text(&text))
+            }),
+            Cells::Typed(Column::Integers(values)) => {
+                each(values, |row, v| format.count(v).map_err(|why| explain(row, why).found(v)))
+            }
+            Cells::Typed(Column::Floats(values)) => each(values.into_iter().map(|v| v.filter(|v| !v.is_nan())), |row, v| {
+                format.fractional_count(v).map_err(|why| explain(row, why).found(v))
+            }),
+            Cells::Typed(Column::Instants(values)) => Ok(values.into_iter().map(|v| v.map(Timestamp)).collect()),
+            Cells::Typed(Column::Naive(values)) => {
+                each(values, |row, v| format.local(v).map_err(|why| explain(row, why).found(v)))
+            }
+            Cells::Typed(other) => Err(self.wrong_type(name, "times", &other)),
+        }
+    }
+
+    /// An error about data row `row`, from 0, of a column: for readers that hold cells to more than their type.
+    #[must_use]
+    pub fn error(&self, name: &str, row: usize, message: impl Into<String>) -> InputError {
+        InputError::new(&self.path, message).at(self.place(row)).in_column(self.own_name(name))
+    }
+
+    /// Where data row `row`, from 0, is in the file.
+    #[must_use]
+    pub fn place(&self, row: usize) -> Place {
+        match &self.body {
+            Body::Csv(csv) => Place::Row(csv.line(row)),
+            Body::Columnar(_) => Place::Row(row + 1),
+        }
+    }
+
+    fn own_names(&self) -> &[String] {
+        match &self.body {
+            Body::Csv(csv) => csv.names(),
+            Body::Columnar(file) => file.names(),
+        }
+    }
+
+    fn own_name<'a>(&'a self, name: &'a str) -> &'a str {
+        self.renames.get(name).map_or(name, String::as_str)
+    }
+
+    fn column(&self, name: &str) -> Result<Cells<'_>, InputError> {
+        let own = self.own_name(name);
+        let index = self.own_names().iter().position(|n| n == own).ok_or_else(|| self.no_column(own))?;
+        Ok(match &self.body {
+            Body::Csv(csv) => Cells::Text(Box::new((0..csv.rows()).map(move |row| csv.cell(row, index)))),
+            Body::Columnar(file) => match file.column(own) {
+                // Some writers keep numbers as texts: they are read as a CSV's cells are.
+                Column::Texts(values) => Cells::Text(Box::new(
+                    values.into_iter().map(|v| v.map_or(Cow::Borrowed(""), |v| Cow::Owned(v.trim().to_owned()))),
+                )),
+                other => Cells::Typed(other),
+            },
+        })
+    }
+
+    fn no_column(&self, own: &str) -> InputError {
+        let names = self.own_names();
+        let meant = did_you_mean(own, names).map(|meant| format!("did you mean `{meant}`? ")).unwrap_or_default();
+        let has = if names.len() == 1 { "column" } else { "columns" };
+        let error = InputError::new(&self.path, format!("there is no column `{own}`"));
+        let hint = match names {
+            [only] if only.contains(';') || only.contains('\t') => {
+                "cells are separated by commas; was the file written with another separator?".to_owned()
+            }
+            _ => format!("{meant}the file has the {has} {}", listed(names)),
+        };
+        error.hint(hint)
+    }
+
+    fn wrong_type(&self, name: &str, expected: &str, found: &Column) -> InputError {
+        let (kind, hint) = match found {
+            Column::Floats(_) | Column::Integers(_) => ("numbers", None),
+            Column::Booleans(_) => ("true and false", None),
+            Column::Texts(_) => ("texts", None),
+            Column::Instants(_) | Column::Naive(_) => ("times", None),
+            Column::Other(kind) => (kind.as_str(), Some("write it as 64-bit numbers, texts or timestamps")),
+        };
+        InputError::new(&self.path, format!("expected {expected}"))
+            .in_column(self.own_name(name))
+            .found(kind)
+            .maybe_hint(hint.map(str::to_owned))
+    }
+
+    fn cell_error(&self, name: &str, row: usize, (message, hint): (&str, &str), text: &str) -> InputError {
+        let error = self.error(name, row, message).found_text(text);
+        if hint.is_empty() { error } else { error.hint(hint) }
+    }
+
+    fn complete<T>(&self, name: &str, cells: Vec<Option<T>>, what: &str) -> Result<Vec<T>, InputError> {
+        let hole = cells.iter().position(Option::is_none);
+        match hole {
+            None => Ok(cells.into_iter().flatten().collect()),
+            Some(row) => Err(self
+                .error(name, row, format!("expected {what}"))
+                .found("an empty cell")
+                .hint("this column must be complete: fill the cell or drop the row")),
+        }
+    }
+}
+
+/// The cells of one column.
+enum Cells<'a> {
+    Text(Box<dyn Iterator<Item = Cow<'a, str>> + 'a>),
+    Typed(Column),
+}
+
+fn each<V, T>(
+    values: impl IntoIterator<Item = Option<V>>,
+    convert: impl Fn(usize, V) -> Result<T, InputError>,
+) -> Result<Vec<Option<T>>, InputError> {
+    values.into_iter().enumerate().map(|(row, value)| value.map(|v| convert(row, v)).transpose()).collect()
+}
+
+/// What is wrong with a cell, and the remedy.
+type Wrong = (&'static str, &'static str);
+const INFINITE: Wrong = ("expected a finite number", "leave the cell empty where a sample was lost");
+const NO_NUMBER: Wrong = ("expected a number", "leave the cell empty where a sample was lost");
+const NO_INTEGER: Wrong = ("expected an integer", "");
+
+fn number(text: &str) -> Result<Option<f64>, Wrong> {
+    if text.is_empty() {
+        return Ok(None);
+    }
+    match text.parse::<f64>() {
+        Ok(value) if value.is_nan() => Ok(None),
+        Ok(value) if value.is_infinite() => Err(INFINITE),
+        Ok(value) => Ok(Some(value)),
+        Err(_) => Err(NO_NUMBER),
+    }
+}
+
+fn integer(text: &str) -> Result<Option<i64>, Wrong> {
+    match text.parse::<i64>() {
+        Ok(value) => Ok(Some(value)),
+        Err(_) => match number(text) {
+            Ok(None) => Ok(None),
+            Ok(Some(value)) => as_integer(value).map(Some).ok_or(NO_INTEGER),
+            Err(_) => Err(NO_INTEGER),
+        },
+    }
+}
