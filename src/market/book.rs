@@ -13,6 +13,17 @@ pub struct Level {
     pub size: f64,
 }
 
+/// What an order pays that takes level after level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Walk {
+    /// Price of the best level [currency].
+    pub touch: f64,
+    /// By how much its average price is worse than the touch [currency]; never negative.
+    pub beyond_touch: f64,
+    /// Whether it is larger than all that is displayed.
+    pub exhausted: bool,
+}
+
 /// The displayed book at one instant: up to [`Book::DEPTH`] levels a side, the best first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Book {
@@ -61,6 +72,38 @@ impl Book {
         self.opposite(side).first().map(|level| level.price)
     }
 
+    /// What is displayed on the side an order of `side` takes from [units].
+    #[must_use]
+    pub fn displayed(&self, side: Side) -> f64 {
+        self.opposite(side).iter().map(|level| level.size).sum()
+    }
+
+    /// An order of `side` over `quantity` [units] that takes level after level; none where that side is empty.
+    ///
+    /// An order larger than all that is displayed takes the rest at the last level: what lies behind it is not known.
+    #[must_use]
+    pub fn walk(&self, side: Side, quantity: f64) -> Option<Walk> {
+        let levels = self.opposite(side);
+        let touch = levels.first()?.price;
+        let (mut left, mut excess, mut last) = (quantity, 0.0, touch);
+        for level in levels {
+            let taken = level.size.min(left);
+            // Distances from the touch, not prices, are added up: an order within the touch pays it to the bit.
+            excess += taken * (level.price - touch);
+            last = level.price;
+            left -= taken;
+            if left <= 0.0 {
+                break;
+            }
+        }
+        let exhausted = left > 0.0;
+        if exhausted {
+            excess += left * (last - touch);
+        }
+        let beyond_touch = if quantity > 0.0 { side.sign() * excess / quantity } else { 0.0 };
+        Some(Walk { touch, beyond_touch, exhausted })
+    }
+
     /// Midway between best bid and best ask, where there are both.
     #[must_use]
     pub fn mid(&self) -> Option<f64> {
@@ -74,5 +117,44 @@ impl Book {
             (Some(ask), Some(bid)) => 0.5 * (ask - bid),
             _ => 0.0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn book() -> Book {
+        let level = |price, size| Level { price, size };
+        Book::new(
+            Timestamp(0),
+            &[level(99.0, 10.0), level(98.0, 30.0)],
+            &[level(101.0, 20.0), level(102.0, 20.0), level(105.0, 10.0)],
+        )
+    }
+
+    fn walk(side: Side, quantity: f64) -> (f64, f64, bool) {
+        let walk = book().walk(side, quantity).unwrap();
+        (walk.touch, walk.beyond_touch, walk.exhausted)
+    }
+
+    #[test]
+    fn a_walk_is_as_computed_by_hand() {
+        assert_eq!(walk(Side::Buy, 20.0), (101.0, 0.0, false));
+        // (20 * 101 + 20 * 102 + 10 * 105) / 50 = 102.2
+        assert!((walk(Side::Buy, 50.0).1 - 1.2).abs() < 1e-12 && !walk(Side::Buy, 50.0).2);
+        // 10 more at 105: 5110 + 1050 over 60 = 102.6667
+        assert!((walk(Side::Buy, 60.0).1 - (6160.0 / 60.0 - 101.0)).abs() < 1e-12 && walk(Side::Buy, 60.0).2);
+        // (10 * 99 + 10 * 98) / 20 = 98.5, half a unit worse than 99 for a seller.
+        assert_eq!(walk(Side::Sell, 20.0), (99.0, 0.5, false));
+        assert_eq!(book().displayed(Side::Sell), 40.0);
+        assert_eq!(walk(Side::Buy, 0.0), (101.0, 0.0, false));
+        assert!(Book::new(Timestamp(0), &[], &[]).walk(Side::Buy, 1.0).is_none());
+    }
+
+    #[test]
+    fn a_book_at_one_price_is_never_exhausted() {
+        let walk = Book::at_price(Timestamp(0), 50.0).walk(Side::Sell, 1e12).unwrap();
+        assert_eq!((walk.touch, walk.beyond_touch, walk.exhausted), (50.0, 0.0, false));
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::sim2real::{Channel, Clock, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical};
 
-use super::{Book, InFlight, OrderLog};
+use super::{Book, InFlight, OrderLog, Side};
 
 /// What an arriving order meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,12 +38,23 @@ pub struct Report {
     pub filled: f64,
 }
 
+/// Cost of an order of `side` that filled at `price` although `assumed` was expected [bps of `mid`]; a loss is positive.
+#[must_use]
+pub fn cost_bps(side: Side, price: f64, assumed: f64, mid: f64) -> f64 {
+    side.sign() * (price - assumed) / mid * 1e4
+}
+
+/// A fee [currency] as a part of the notional it was paid on [bps]; none where nothing was traded.
+#[must_use]
+pub fn fee_bps(fee: f64, notional: f64) -> Option<f64> {
+    (notional > 0.0).then(|| fee / notional * 1e4)
+}
+
 impl Observation for Report {
     fn channel(&self, k: usize) -> f64 {
         match k {
             0 => self.cost,
-            1 if self.price * self.quantity > 0.0 => self.fee / (self.price * self.quantity) * 1e4,
-            1 => 0.0,
+            1 => fee_bps(self.fee, self.price * self.quantity).unwrap_or(0.0),
             _ => self.filled,
         }
     }
@@ -78,8 +89,23 @@ impl Plant for Execution {
         Vec::new()
     }
 
-    fn typical(&self, _recordings: &[Recording<OrderLog>]) -> Typical {
-        Typical::default()
+    fn typical(&self, recordings: &[Recording<OrderLog>]) -> Typical {
+        let orders = || recordings.iter().flat_map(|recording| recording.stimulus.orders());
+        let costs: Vec<f64> = recordings
+            .iter()
+            .filter_map(|recording| recording.channel("cost"))
+            .flat_map(|cost| cost.samples.iter().flatten().copied())
+            .collect();
+        let size = |values: Vec<f64>| median(values).filter(|v| *v > 0.0).unwrap_or(1.0);
+        let mean = costs.iter().sum::<f64>() / costs.len().max(1) as f64;
+        let spread = (costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / costs.len().max(1) as f64).sqrt();
+        Typical {
+            command: size(orders().map(|order| order.quantity).collect()),
+            effort: size(costs.iter().map(|cost| cost.abs()).collect()),
+            output: if spread > 0.0 { spread } else { 1.0 },
+            delay: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_delay()).collect()),
+            ..Typical::default()
+        }
     }
 
     fn initial_parameters(&self, _recording: &Recording<OrderLog>) -> Vec<Parameter> {
@@ -91,6 +117,43 @@ impl Plant for Execution {
     }
 }
 
+impl Execution {
+    /// Half a cent: what a fee that is rounded to the cent is off by at most [currency].
+    const FEE_ROUNDING: f64 = 0.005;
+
+    /// To what precision a log can tell a channel, in its unit: no fit of it can be better than that.
+    ///
+    /// - `cost` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
+    /// - `fee` [bps]: half a cent over the notional;
+    /// - `filled` []: half a lot over the quantity.
+    ///
+    /// Each is the median over the orders; 0 for a channel of another name, or without orders.
+    #[must_use]
+    pub fn resolution_of(recording: &Recording<OrderLog>, channel: &str) -> f64 {
+        let instrument = recording.stimulus.instrument();
+        let of = |order: &InFlight| match channel {
+            "cost" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
+            "fee" => Self::FEE_ROUNDING / (order.quantity * order.mid) * 1e4,
+            "filled" => 0.5 * instrument.lot_size / order.quantity,
+            _ => 0.0,
+        };
+        median(recording.stimulus.orders().iter().map(of).collect()).unwrap_or(0.0)
+    }
+
+    /// What the residuals of a log may depend on, by name, one value an order; the order is that in which a dependence
+    /// is to be believed, and what follows the decision comes last.
+    #[must_use]
+    pub fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, Vec<f64>)> {
+        super::covariate::covariates(recording)
+    }
+}
+
+/// The middle value, the upper of two.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
 impl Dynamics<Execution> for Execution {
     fn initial(&self, initial: &Thetas) -> Vec<Report> {
         vec![Report::default(); initial.lanes()]
@@ -99,12 +162,12 @@ impl Dynamics<Execution> for Execution {
     fn advance(&self, _tick: Tick, reports: &mut [Report], met: &[Met], orders: &[InFlight], effects: &[ExecutionEffect]) {
         for (((report, met), order), effect) in reports.iter_mut().zip(met).zip(orders).zip(effects) {
             let price = met.reference + order.side.sign() * effect.concession;
-            let quantity = order.quantity.min(order.participation_limit * met.volume);
+            let quantity = order.fillable(met.volume);
             *report = Report {
                 price,
                 quantity,
                 fee: 0.0,
-                cost: order.side.sign() * (price - order.assumed) / order.mid * 1e4,
+                cost: cost_bps(order.side, price, order.assumed, order.mid),
                 filled: quantity / order.quantity,
             };
         }

@@ -12,6 +12,21 @@ pub enum Side {
 }
 
 impl Side {
+    /// Its word in logs.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Buy => "buy",
+            Self::Sell => "sell",
+        }
+    }
+
+    /// The side `word` stands for: `buy` or `sell`, in any case.
+    #[must_use]
+    pub fn of_word(word: &str) -> Option<Self> {
+        [Self::Buy, Self::Sell].into_iter().find(|side| word.eq_ignore_ascii_case(side.word()))
+    }
+
     /// +1 for a buy, -1 for a sell.
     #[must_use]
     pub fn sign(self) -> f64 {
@@ -46,10 +61,45 @@ pub struct InFlight {
 }
 
 impl InFlight {
-    /// Part of an average day's volume it asks for; 0 where that volume is not known.
+    /// A market order that arrives when it is decided, with nothing that limits it and nothing known of its
+    /// instrument's volume and volatility.
     #[must_use]
-    pub fn participation(&self) -> f64 {
-        self.average_daily_volume.map_or(0.0, |volume| self.quantity / volume)
+    pub fn market(side: Side, quantity: f64, decided_at: Timestamp, assumed: f64, mid: f64) -> Self {
+        Self {
+            side,
+            quantity,
+            decided_at,
+            arrives_at: decided_at,
+            assumed,
+            mid,
+            participation_limit: f64::INFINITY,
+            average_daily_volume: None,
+            daily_volatility: None,
+        }
+    }
+
+    /// The same order, arriving at another time.
+    #[must_use]
+    pub fn arriving(mut self, at: Timestamp) -> Self {
+        self.arrives_at = at;
+        self
+    }
+
+    /// What of it can be filled where it meets `volume` [units].
+    #[must_use]
+    pub fn fillable(&self, volume: f64) -> f64 {
+        // No limit is no limit, even where nothing is displayed: infinity times 0 is not a number.
+        if self.participation_limit == f64::INFINITY {
+            self.quantity
+        } else {
+            self.quantity.min(self.participation_limit * volume)
+        }
+    }
+
+    /// Part of an average day's volume that it is where it meets `volume` [units]; 0 where a day's is not known.
+    #[must_use]
+    pub fn participation(&self, volume: f64) -> f64 {
+        self.average_daily_volume.map_or(0.0, |daily| self.fillable(volume) / daily)
     }
 }
 

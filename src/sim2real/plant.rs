@@ -129,10 +129,12 @@ pub struct Typical {
     pub output: f64,
     /// Of the first channel's rate of change [its unit/s].
     pub rate: f64,
+    /// The delay the recordings' own stamps show [s], where they show one.
+    pub delay: Option<f64>,
 }
 
 impl Default for Typical {
     fn default() -> Self {
-        Self { command: 1.0, effort: 1.0, output: 1.0, rate: 1.0 }
+        Self { command: 1.0, effort: 1.0, output: 1.0, rate: 1.0, delay: None }
     }
 }

@@ -1,6 +1,6 @@
 //! The price of immediacy: an order that takes pays half the spread.
 
-use crate::market::{Execution, ExecutionEffect, InFlight, Met, Report};
+use crate::market::{Execution, ExecutionEffect, InFlight, Met, OrderLog, Report};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
 
 /// `price = reference + side * fraction * (ask - bid) / 2`, or `reference + side * bps * mid / 1e4` where no quotes are
@@ -37,6 +37,11 @@ impl Mechanism<Execution> for HalfSpread {
                 parameters: vec![Parameter::new("bps", "bps", 0.0).within(0.0, 1_000.0).starting_at(&[0.5, 5.0])],
             },
         ]
+    }
+
+    /// The fraction needs quotes; where there are quotes they, and no constant, say what the spread was.
+    fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
+        (form == FRACTION) != log.tape().quotes().is_empty()
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {

@@ -33,8 +33,10 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
         }
     }
 
-    fn forms(&self, _typical: &Typical) -> Vec<Form> {
-        let mut seconds = Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(self.starts);
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let shown = typical.delay.filter(|delay| *delay > 0.0 && *delay <= self.longest);
+        let starts: Vec<f64> = shown.into_iter().chain(self.starts.iter().copied()).collect();
+        let mut seconds = Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(&starts);
         seconds.smooth = self.smooth;
         Form::only(vec![seconds])
     }

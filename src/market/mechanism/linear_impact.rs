@@ -1,0 +1,54 @@
+//! Impact that grows with the size.
+
+use crate::market::{Execution, ExecutionEffect, InFlight, Met, OrderLog, Report};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+
+/// `price = reference + side * bps * Q / V * mid / 1e4`, with Q the quantity filled and V the units
+/// traded on an average day; `bps` is `bps_at_full_participation`, the concession of an order as large as a day's
+/// volume.
+///
+/// Source: Kyle, "Continuous auctions and insider trading", Econometrica 53 (1985): his lambda is
+/// `bps * mid / (1e4 V)`.
+#[derive(Debug, Clone, Copy)]
+pub struct LinearImpact;
+
+impl Mechanism<Execution> for LinearImpact {
+    fn about(&self) -> About {
+        About {
+            name: "linear_impact",
+            site: Site::Plant,
+            title: "linear impact",
+            law: "concession = bps * Q / V * mid / 1e4",
+            source: "Kyle, Econometrica 53 (1985)",
+            remedy: "charge lambda * Q, or trade in smaller parts",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, _typical: &Typical) -> Vec<Form> {
+        Form::only(vec![
+            Parameter::new("bps_at_full_participation", "bps", 0.0).within(0.0, 100_000.0).starting_at(&[10.0, 100.0]),
+        ])
+    }
+
+    /// It needs the average daily volume.
+    fn applies(&self, _form: usize, _plant: &Execution, log: &OrderLog) -> bool {
+        log.instrument().average_daily_volume.is_some()
+    }
+
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
+        Box::new(Impact { bps: thetas.row(0).to_vec() })
+    }
+}
+
+struct Impact {
+    bps: Vec<f64>,
+}
+
+impl Law<Execution> for Impact {
+    fn act(&mut self, _tick: Tick, _: &[Report], met: &[Met], orders: &[InFlight], effects: &mut [ExecutionEffect]) {
+        for (((effect, met), order), bps) in effects.iter_mut().zip(met).zip(orders).zip(&self.bps) {
+            effect.concession += bps * order.participation(met.volume) * order.mid * 1e-4;
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Finding an order's own trades on the tape.
+//!
+//! Once an order has traded, quotes and trades show its own impact. A simulation that reads them at its assumed arrival
+//! would find that impact there and take it for latency; so what the order met is read no later than its own print.
+
+use crate::sim2real::Timestamp;
+
+use super::{Print, Side};
+
+/// One fill, as far as prints show it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piece {
+    /// Quantity [units].
+    pub quantity: f64,
+    /// Price [currency].
+    pub price: f64,
+}
+
+/// By how much a stamp may have been rounded up [ns]: the step of a 64-bit float at today's count of nanoseconds.
+const ROUNDING: i64 = 256;
+
+/// The stamp of an order's own first print: the one run of neighbouring `prints` that shows its fills in their order,
+/// after its decision and no later than its `first_fill` was reported. None where there is no such run, or several.
+#[must_use]
+pub fn own_print(
+    prints: &[Print],
+    side: Side,
+    decided_at: Timestamp,
+    first_fill: Timestamp,
+    fills: &[Piece],
+) -> Option<Timestamp> {
+    let from = prints.partition_point(|print| print.time <= decided_at);
+    let to = from + prints[from..].partition_point(|print| print.time <= first_fill + ROUNDING);
+    let mut runs = (from..to).filter(|start| shows(&prints[*start..], side, fills));
+    let found = runs.next()?;
+    match runs.next() {
+        None => Some(prints[found].time),
+        Some(_) => None,
+    }
+}
+
+fn shows(prints: &[Print], side: Side, fills: &[Piece]) -> bool {
+    let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs();
+    let one = |(print, fill): (&Print, &Piece)| {
+        print.aggressor.is_none_or(|aggressor| aggressor == side)
+            && close(print.size, fill.quantity)
+            && close(print.price, fill.price)
+    };
+    !fills.is_empty() && prints.len() >= fills.len() && prints.iter().zip(fills).all(one)
+}
+
+/// The delay between decision and own print the stamps show [s]: the median of `delays` [s], where at least 25 orders
+/// were found and the distance between their quartiles is less than a tenth of it.
+#[must_use]
+pub fn shown_delay(mut delays: Vec<f64>) -> Option<f64> {
+    const ENOUGH: usize = 25;
+    if delays.len() < ENOUGH {
+        return None;
+    }
+    delays.sort_by(f64::total_cmp);
+    let quantile = |part: f64| delays[((delays.len() - 1) as f64 * part).round() as usize];
+    let median = quantile(0.5);
+    (quantile(0.75) - quantile(0.25) < 0.1 * median).then_some(median)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn print(time: i64, price: f64, size: f64, aggressor: Option<Side>) -> Print {
+        Print { time: Timestamp(time), price, size, aggressor }
+    }
+
+    fn piece(quantity: f64, price: f64) -> Piece {
+        Piece { quantity, price }
+    }
+
+    fn find(prints: &[Print], fills: &[Piece]) -> Option<i64> {
+        own_print(prints, Side::Buy, Timestamp(1_000), Timestamp(5_000), fills).map(|t| t.0)
+    }
+
+    #[test]
+    fn the_one_run_that_shows_all_fills_is_the_orders_own() {
+        let buy = Some(Side::Buy);
+        let prints = [
+            print(1_000, 10.0, 5.0, buy),
+            print(2_000, 10.0, 5.0, buy),
+            print(3_000, 10.0, 5.0, Some(Side::Sell)),
+            print(3_000, 10.0, 5.0, buy),
+            print(3_000, 10.1, 7.0, buy),
+            print(6_000, 10.0, 5.0, buy),
+        ];
+        assert_eq!(find(&prints, &[piece(5.0, 10.0), piece(7.0, 10.1)]), Some(3_000));
+        assert_eq!(find(&prints, &[piece(5.0, 10.0)]), None, "two runs would fit");
+        assert_eq!(find(&prints[..2], &[piece(5.0, 10.0)]), Some(2_000), "a print of the decision's stamp is not its own");
+        assert_eq!(find(&prints[5..], &[piece(5.0, 10.0)]), None, "it comes after the fill was reported");
+        assert_eq!(find(&prints, &[piece(5.0, 10.0), piece(7.0, 10.2)]), None);
+        assert_eq!(find(&prints, &[]), None);
+    }
+
+    #[test]
+    fn a_stamp_rounded_up_and_a_print_of_unknown_side_are_understood() {
+        assert_eq!(find(&[print(5_256, 10.0, 5.0, None)], &[piece(5.0, 10.0)]), Some(5_256));
+        assert_eq!(find(&[print(5_257, 10.0, 5.0, None)], &[piece(5.0, 10.0)]), None);
+    }
+
+    #[test]
+    fn a_delay_is_shown_by_many_orders_that_agree() {
+        assert_eq!(shown_delay(vec![0.25; 24]), None);
+        assert_eq!(shown_delay(vec![0.25; 25]), Some(0.25));
+        assert_eq!(shown_delay((1..=100).map(f64::from).collect()), None);
+    }
+}

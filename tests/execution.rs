@@ -1,0 +1,316 @@
+//! The execution plant and its mechanisms on a log in which everything is known.
+
+use std::sync::Arc;
+
+use trueup::market::{
+    Execution, Instrument, Level, LogError, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog, OrderType,
+    PriceAssumption, Print, Quotes, Side, Tape, TapeBar,
+};
+use trueup::sim2real::{
+    Assembly, Candidate, Plant, Recording, Seed, Simulator, Thetas, Timestamp, Twin, check_mechanism, check_plant,
+};
+
+const SECOND: i64 = Timestamp::NANOS;
+const DELAY: i64 = 200_000_000;
+const ORDERS: i64 = 40;
+
+fn at(seconds: i64) -> Timestamp {
+    Timestamp(1_700_000_000 * SECOND + seconds * SECOND)
+}
+
+fn instrument() -> Instrument {
+    Instrument {
+        symbol: "XYZ".into(),
+        tick_size: 0.01,
+        lot_size: 1.0,
+        average_daily_volume: Some(1e6),
+        daily_volatility: Some(0.02),
+    }
+}
+
+fn level(price: f64, size: f64) -> Level {
+    Level { price, size }
+}
+
+/// Mid in second `k`: it wanders by whole cents.
+fn mid(k: i64) -> f64 {
+    100.0 + 0.01 * ((k * 7) % 11) as f64
+}
+
+/// Three levels a side; the spread is 2 or 4 cents, the touch holds 30.
+fn levels(k: i64) -> ([Level; 3], [Level; 3]) {
+    let half = if k % 3 == 0 { 0.02 } else { 0.01 };
+    let side = |sign: f64| [0.0, 0.02, 0.03].map(|deeper| level(mid(k) + sign * (half + deeper), 30.0));
+    (side(-1.0), side(1.0))
+}
+
+/// An order every ten seconds, decided on the book of that second and filled at the one of 0.1 s later, which is in
+/// force when it arrives after 0.2 s.
+fn order(k: i64) -> LoggedOrder {
+    LoggedOrder {
+        id: format!("o{k}"),
+        side: if k % 2 == 0 { Side::Buy } else { Side::Sell },
+        quantity: [20.0, 45.0, 75.0][(k % 3) as usize],
+        decided_at: at(10 * k),
+        kind: OrderType::Market,
+    }
+}
+
+/// The levels order `k` takes: price and quantity.
+fn pieces(k: i64) -> Vec<(f64, f64)> {
+    let (bids, asks) = levels(10 * k + 1);
+    let mut left = order(k).quantity;
+    let taken = if order(k).side == Side::Buy { asks } else { bids }.map(|level| {
+        let quantity = level.size.min(left);
+        left -= quantity;
+        (level.price, quantity)
+    });
+    taken.into_iter().filter(|(_, quantity)| *quantity > 0.0).collect()
+}
+
+fn fills() -> Vec<LoggedFill> {
+    let fill = |k: i64| {
+        pieces(k).into_iter().map(move |(price, quantity)| LoggedFill {
+            order_id: format!("o{k}"),
+            filled_at: at(10 * k) + 2 * DELAY,
+            quantity,
+            price,
+            fee: 0.5e-4 * price * quantity,
+        })
+    };
+    (0..ORDERS).flat_map(fill).collect()
+}
+
+fn quotes() -> Quotes {
+    let mut quotes = Quotes::with_depth(3);
+    for k in 0..10 * ORDERS {
+        let (bids, asks) = levels(k);
+        if k % 10 == 1 {
+            // The next book comes 0.1 s after a decision; at the arrival stamp the order's own impact is to be seen.
+            quotes.push(at(k - 1) + DELAY / 2, &bids, &asks);
+            quotes.push(at(k - 1) + DELAY, &[level(90.0, 1.0)], &[level(110.0, 1.0)]);
+        }
+        quotes.push(at(k), &bids, &asks);
+    }
+    quotes
+}
+
+fn prints() -> Vec<Print> {
+    let print = |k: i64| {
+        pieces(k).into_iter().map(move |(price, size)| Print {
+            time: at(10 * k) + DELAY,
+            price,
+            size,
+            aggressor: Some(order(k).side),
+        })
+    };
+    (0..ORDERS).flat_map(print).collect()
+}
+
+fn log(
+    tape: Tape,
+    price: PriceAssumption,
+    orders: &[LoggedOrder],
+    fills: &[LoggedFill],
+) -> Result<Recording<OrderLog>, LogError> {
+    OrderLog::recording("synthetic", LogMarket { instrument: instrument(), tape: Arc::new(tape), price }, orders, fills)
+}
+
+fn orders() -> Vec<LoggedOrder> {
+    (0..ORDERS).map(order).collect()
+}
+
+fn full() -> Recording<OrderLog> {
+    log(Tape::new(quotes(), prints(), Vec::new()), PriceAssumption::Mid, &orders(), &fills()).unwrap()
+}
+
+/// The same orders on a tape of bars of ten seconds.
+fn on_bars(price: PriceAssumption) -> Recording<OrderLog> {
+    let bar = |k: i64| TapeBar {
+        open_at: at(10 * k),
+        known_at: at(10 * k + 10),
+        open: mid(10 * k),
+        close: mid(10 * k + 9),
+        volume: 400.0,
+    };
+    log(Tape::new(Quotes::default(), Vec::new(), (-1..ORDERS + 1).map(bar).collect()), price, &orders(), &fills()).unwrap()
+}
+
+fn with(
+    assembly: Assembly<Execution>,
+    recording: &Recording<OrderLog>,
+    name: &str,
+    form: &str,
+    value: f64,
+) -> Assembly<Execution> {
+    let candidates = assembly.candidates(std::slice::from_ref(recording));
+    let found: &Candidate = candidates.iter().find(|c| c.about.name == name && c.form.name == form).unwrap();
+    let mut values: Vec<f64> = assembly.parameters().iter().map(|p| p.nominal).collect();
+    values.push(value);
+    assembly.with(found).with_values(&values)
+}
+
+/// Largest distance between a measured and a simulated channel.
+fn worst(assembly: &Assembly<Execution>, recording: &Recording<OrderLog>, channel: &str) -> f64 {
+    let values: Vec<f64> = assembly.parameters().iter().map(|p| p.nominal).collect();
+    let trajectory = assembly.rollout(&Thetas::single(&values), recording, recording.len(), Seed(1)).remove(0);
+    let simulated = trajectory.into_iter().find(|s| s.channel == channel).unwrap().samples;
+    let measured = &recording.channel(channel).unwrap().samples;
+    measured.iter().zip(simulated).filter_map(|(m, s)| Some((m.as_ref()? - s).abs())).fold(0.0, f64::max)
+}
+
+fn bare() -> Assembly<Execution> {
+    Assembly::new(Execution, MECHANISMS)
+}
+
+#[test]
+fn the_plant_and_every_row_of_the_registry_keep_their_contracts() {
+    for recording in [full(), on_bars(PriceAssumption::BarClose), on_bars(PriceAssumption::NextOpen)] {
+        check_plant(&Execution, MECHANISMS, &recording).unwrap();
+        for mechanism in MECHANISMS {
+            // The delays it starts at are shorter than the bars: no close is missed by them.
+            if recording.stimulus.price() != PriceAssumption::BarClose || mechanism.about().name != "command_delay" {
+                check_mechanism(*mechanism, &Execution, MECHANISMS, &recording).unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn spread_walk_delay_and_commission_add_up_to_what_was_paid() {
+    let recording = full();
+    let log = &recording.stimulus;
+    assert!((log.shown_delay().unwrap() - 0.2).abs() < 1e-9, "{:?}", log.shown_delay());
+    assert!(log.own_prints().iter().all(Option::is_some));
+    assert_eq!(log.notes(), &[] as &[String]);
+    let whole = with(bare(), &recording, "half_spread", "fraction", 1.0);
+    let whole = with(whole, &recording, "book_walk", "", 1.0);
+    let whole = with(whole, &recording, "commission", "bps", 0.5);
+    assert!(worst(&whole, &recording, "cost") > 0.1, "without the delay it does not add up");
+    let delayed = with(whole.clone(), &recording, "command_delay", "", 0.2);
+    assert!(worst(&delayed, &recording, "cost") < 1e-9);
+    assert!(worst(&delayed, &recording, "fee") < 1e-9);
+    assert_eq!(worst(&delayed, &recording, "filled"), 0.0);
+    assert!(worst(&bare(), &recording, "fee") > 0.49);
+    // The own prints keep a delay that is too long from finding the order's own impact.
+    let late = with(whole, &recording, "command_delay", "", 0.9);
+    assert!(worst(&late, &recording, "cost") < 1e-9);
+}
+
+#[test]
+fn without_prints_the_own_impact_is_met_by_a_delay_that_is_too_long() {
+    let recording = log(Tape::new(quotes(), Vec::new(), Vec::new()), PriceAssumption::Mid, &orders(), &fills()).unwrap();
+    assert_eq!(recording.stimulus.shown_delay(), None);
+    let whole = with(bare(), &recording, "half_spread", "fraction", 1.0);
+    let whole = with(whole, &recording, "book_walk", "", 1.0);
+    // Strictly before its arrival: the row stamped 0.2 s after the decision is not met at a delay of 0.2 s.
+    assert!(worst(&with(whole.clone(), &recording, "command_delay", "", 0.2), &recording, "cost") < 1e-9);
+    assert!(worst(&with(whole, &recording, "command_delay", "", 0.200_001), &recording, "cost") > 1.0);
+}
+
+#[test]
+fn a_cap_fills_the_part_of_the_displayed_size_it_allows() {
+    let recording = full();
+    let capped = with(bare(), &recording, "participation_cap", "", 0.5);
+    let trajectory = capped.rollout(&Thetas::single(&[0.5]), &recording, 3, Seed(1)).remove(0);
+    // 90 are displayed on each side, so 45 can be filled of 20, 45 and 75.
+    assert_eq!(trajectory[2].samples, [1.0, 1.0, 0.6]);
+}
+
+#[test]
+fn impacts_are_what_their_laws_say() {
+    let recording = full();
+    let cost = |name: &str| {
+        let assembly = with(bare(), &recording, name, "", 100.0);
+        assembly.rollout(&Thetas::single(&[100.0]), &recording, 1, Seed(1)).remove(0)[0].samples[0]
+    };
+    let participation = 20.0 / 1e6_f64;
+    assert!((cost("sqrt_impact") - 100.0 * participation.sqrt()).abs() < 1e-9);
+    assert!((cost("linear_impact") - 100.0 * participation).abs() < 1e-9);
+}
+
+#[test]
+fn forms_apply_where_the_data_know_what_they_need() {
+    let forms = |recording: &Recording<OrderLog>| -> Vec<String> {
+        let candidates = bare().candidates(std::slice::from_ref(recording));
+        candidates.iter().map(|c| format!("{}.{}", c.about.name, c.form.name)).collect()
+    };
+    let quoted = forms(&full());
+    assert!(quoted.contains(&"half_spread.fraction".into()) && quoted.contains(&"book_walk.".into()));
+    assert!(!quoted.contains(&"half_spread.bps".into()));
+    let bars = forms(&on_bars(PriceAssumption::BarClose));
+    assert!(bars.contains(&"half_spread.bps".into()) && bars.contains(&"participation_cap.".into()));
+    assert!(!bars.contains(&"half_spread.fraction".into()) && !bars.contains(&"book_walk.".into()));
+}
+
+#[test]
+fn the_delay_the_stamps_show_is_where_fits_begin() {
+    let candidates = bare().candidates(&[full()]);
+    let delay = candidates.iter().find(|c| c.about.name == "command_delay").unwrap();
+    assert!((delay.form.parameters[0].starts[0] - 0.2).abs() < 1e-9);
+    assert_eq!(Execution.typical(&[on_bars(PriceAssumption::BarClose)]).delay, None);
+}
+
+#[test]
+fn resolutions_are_those_of_tick_cent_and_lot() {
+    let recording = full();
+    let order = &recording.stimulus.orders()[0];
+    let cost = Execution::resolution_of(&recording, "cost");
+    assert!((cost - 0.01 / 12.0_f64.sqrt() / order.mid * 1e4).abs() < 1e-3 * cost);
+    let fee = Execution::resolution_of(&recording, "fee");
+    assert!((fee - 0.005 / (45.0 * order.mid) * 1e4).abs() < 1e-2 * fee);
+    assert_eq!(Execution::resolution_of(&recording, "filled"), 0.5 / 45.0);
+    assert_eq!(Execution::resolution_of(&recording, "nothing"), 0.0);
+}
+
+#[test]
+fn covariates_have_a_value_an_order_and_rank_the_future_last() {
+    let recording = full();
+    let covariates = Execution::covariates(&recording);
+    assert_eq!(covariates.len(), 17);
+    assert!(covariates.iter().all(|(_, values)| values.len() == recording.len() && values.iter().all(|v| v.is_finite())));
+    let of = |name: &str| covariates.iter().find(|(n, _)| *n == name).unwrap().1[..3].to_vec();
+    assert_eq!(of("quantity / size at the touch"), [20.0 / 30.0, 1.5, 2.5]);
+    assert!(of("gap to the second level").iter().all(|gap| (gap - 0.02).abs() < 1e-9));
+    assert!(covariates[15].0.ends_with("after") && covariates[16].0.ends_with("after"));
+    assert!(Execution::covariates(&on_bars(PriceAssumption::BarClose)).iter().all(|(name, _)| !name.contains("touch")));
+}
+
+#[test]
+fn orders_beyond_the_displayed_book_or_unfilled_have_no_cost() {
+    let mut orders = orders();
+    orders[2].quantity = 200.0;
+    orders.push(LoggedOrder { id: "rests".into(), kind: OrderType::Other("limit".into()), ..order(5) });
+    let fills: Vec<LoggedFill> = fills().into_iter().filter(|fill| fill.order_id != "o1").collect();
+    let recording = log(Tape::new(quotes(), prints(), Vec::new()), PriceAssumption::Mid, &orders, &fills).unwrap();
+    let sample = |channel: &str, row: usize| recording.channel(channel).unwrap().samples[row];
+    assert_eq!((sample("cost", 1), sample("fee", 1), sample("filled", 1)), (None, None, Some(0.0)));
+    assert_eq!((sample("cost", 2), sample("filled", 2)), (None, Some(75.0 / 200.0)));
+    assert!(sample("cost", 0).is_some() && sample("fee", 2).is_some());
+    let notes = recording.stimulus.notes().join("\n");
+    for part in ["1 of 40 orders are larger", "1 of 40 orders were not filled", "1 of 41 orders are not market orders"] {
+        assert!(notes.contains(part), "{notes}");
+    }
+}
+
+#[test]
+fn orders_off_the_tape_are_an_error_that_says_by_how_much() {
+    let tape = || Tape::new(quotes(), prints(), Vec::new());
+    let shifted = |seconds: i64| {
+        let orders: Vec<_> =
+            (0..ORDERS).map(|k| LoggedOrder { decided_at: order(k).decided_at + seconds * SECOND, ..order(k) }).collect();
+        log(tape(), PriceAssumption::Mid, &orders, &[]).unwrap_err().to_string()
+    };
+    let early = shifted(-5 * 3600);
+    assert!(early.contains("40 of 40 orders are outside the tape; this one is decided 18000 s before the tape begins"), "{early}");
+    assert!(early.contains("row 1, column `decided_at`") && early.contains("hint: is one of the files in another zone, 5 h"));
+    assert!(shifted(4 * 3600).contains("after the tape ends"));
+    assert!(shifted(-1_600_000_000).contains("time_unit"));
+    let nothing = log(Tape::default(), PriceAssumption::Mid, &orders(), &[]).unwrap_err().to_string();
+    assert!(nothing.contains("there are no quotes"), "{nothing}");
+    let limit = LoggedOrder { kind: OrderType::Other("limit".into()), ..order(0) };
+    let none = log(tape(), PriceAssumption::Mid, &[limit], &[]).unwrap_err().to_string();
+    assert!(none.contains("only market orders are modelled"), "{none}");
+    let last = log(Tape::new(quotes(), Vec::new(), Vec::new()), PriceAssumption::Last, &orders(), &[]).unwrap_err();
+    assert!(last.to_string().contains("there are no trades"), "{last}");
+}
