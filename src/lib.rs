@@ -10,6 +10,5 @@
 pub mod io;
 pub mod market;
 pub mod sim2real;
-#[cfg(feature = "io")]
 #[path = "../strategies/mod.rs"]
 pub mod strategies;

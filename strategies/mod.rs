@@ -143,10 +143,30 @@ mod tests {
 
     #[test]
     fn a_table_that_makes_no_strategy_says_why() {
-        insta::assert_snapshot!(error("kind = 'sma_corss'\nfast = 1\nslow = 2"), @r#""#);
-        insta::assert_snapshot!(error("fast = 1"), @"");
-        insta::assert_snapshot!(error("kind = 'sma_cross'\nfast = 10\nslow = 50\nwieght = 1.0"), @"");
-        insta::assert_snapshot!(error("kind = 'sma_cross'\nfast = 50\nslow = 10"), @"");
-        insta::assert_snapshot!(error("kind = 'buy_and_hold'\nweight = nan"), @"");
+        for (table, expected) in [
+            (
+                "kind = 'sma_corss'\nfast = 1",
+                "[strategy] kind = \"sma_corss\" is not known\nhint: did you mean `sma_cross`?",
+            ),
+            ("kind = 'moon'", "[strategy] kind = \"moon\" is not known\nhint: there are `buy_and_hold`, `sma_cross`"),
+            (
+                "fast = 1",
+                "[strategy] does not say its `kind`\nhint: add kind = \"sma_cross\"; there are `buy_and_hold`, `sma_cross`",
+            ),
+            (
+                "kind = 'sma_cross'\nfast = 50\nslow = 10",
+                "[strategy] sma_cross: slow is 10\nhint: `slow` must be above `fast`",
+            ),
+        ] {
+            assert_eq!(error(table), expected);
+        }
+        let unknown = error("kind = 'sma_cross'\nfast = 10\nslow = 50\nwieght = 1.0");
+        assert!(
+            unknown.contains("`wieght`") && unknown.contains("its parameters are fast, slow, short, weight"),
+            "{unknown}"
+        );
+        assert!(error("kind = 'sma_cross'\nfast = 10").contains("missing field `slow`"));
+        assert!(error("kind = 'sma_cross'\nfast = -10\nslow = 5").contains("fast, slow"));
+        assert!(error("kind = 'buy_and_hold'\nweight = nan").contains("weight is NaN"));
     }
 }

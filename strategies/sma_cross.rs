@@ -124,3 +124,41 @@ impl Strategy for SmaCross {
         orders.to_position(view, event.instrument, Quantity(size.0 * wanted));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::market::Price;
+    use crate::sim2real::Timestamp;
+
+    fn bars(closes: &[i64]) -> Vec<Bar> {
+        let bar = |(k, close): (usize, &i64)| {
+            let (open_at, price) = (Timestamp(k as i64), Price(*close));
+            Bar { open_at, known_at: open_at + 1, open: price, high: price, low: price, close: price, volume: 0.0 }
+        };
+        closes.iter().enumerate().map(bar).collect()
+    }
+
+    /// After any number of bars the kept sums decide as sums made anew from integers do.
+    #[test]
+    fn kept_averages_are_exact_whatever_the_history() {
+        let mut state = 1_u64;
+        let closes: Vec<i64> = (0..20_000)
+            .map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                1 + (state >> 40) as i64
+            })
+            .collect();
+        let bars = bars(&closes);
+        let parameters = Parameters { fast: 3, slow: 7, short: false, weight: 1.0 };
+        let mut strategy = SmaCross::new(parameters).unwrap();
+        strategy.sums.resize(1, Sums::default());
+        for end in 1..=bars.len() {
+            let window = &bars[end.saturating_sub(strategy.lookback())..end];
+            let found = strategy.above(0, window);
+            let sum = |count: usize| closes[end - count..end].iter().sum::<i64>();
+            let expected = (end >= 7).then(|| (sum(3) * 7).cmp(&(sum(7) * 3))).filter(|o| o.is_ne()).map(|o| o.is_gt());
+            assert_eq!(found, expected, "bar {end}");
+        }
+    }
+}

@@ -63,6 +63,18 @@ pub enum Status {
     Cancelled,
 }
 
+impl Status {
+    /// Its word in tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Unfilled => "unfilled",
+            Self::Filled => "filled",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
 /// An order that was sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Order {

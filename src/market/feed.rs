@@ -98,7 +98,9 @@ mod tests {
     #[test]
     fn events_come_by_time_then_instrument_then_kind() {
         let mut quotes = Quotes::with_depth(1);
-        [4, 4, 5].map(|t| quotes.push(Timestamp(t), &[Level { price: 1.0, size: 1.0 }], &[]));
+        for t in [4, 4, 5] {
+            quotes.push(Timestamp(t), &[Level { price: 1.0, size: 1.0 }], &[]);
+        }
         let histories = [
             History::new(vec![bar(4), bar(8)], quotes).unwrap(),
             History::new(vec![bar(3), bar(5)], Quotes::default()).unwrap(),

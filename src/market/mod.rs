@@ -10,6 +10,8 @@ mod daily;
 mod execution;
 mod feed;
 mod history;
+#[cfg(feature = "io")]
+mod history_file;
 mod instrument;
 mod ledger;
 mod log_entry;
@@ -21,6 +23,8 @@ mod order_log;
 mod own_print;
 mod price_assumption;
 mod quote;
+#[cfg(feature = "io")]
+mod run_log;
 mod strategy;
 mod tape;
 mod venue;
@@ -44,6 +48,8 @@ pub use order_log::{LogMarket, OrderLog};
 pub use own_print::{Piece, own_print, shown_delay};
 pub use price_assumption::PriceAssumption;
 pub use quote::{Quote, QuoteSlice, Quotes};
+#[cfg(feature = "io")]
+pub use run_log::{InputHash, Provenance, RunSummary};
 pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
 pub use tape::{Print, Seen, Tape, TapeBar};
 pub use venue::{Answer, Reference, Venue};
