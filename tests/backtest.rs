@@ -268,7 +268,7 @@ fn impacts_use_the_days_that_are_over() {
     let plan = [(0, 0, Side::Buy, 3.0), (3, 0, Side::Buy, 3.0), (6, 0, Side::Buy, 3.0)];
     let mut settings = settings();
     settings.max_leverage = 100.0;
-    let record = run_with(vec![history], &[("linear_impact", "bps_at_full_participation", 10_000.0)], settings, &plan);
+    let record = run_with(vec![history], &[("linear_impact", "", 10_000.0)], settings, &plan);
     let prices: Vec<f64> = record.blotter.fills.iter().map(|f| f.price.to_f64()).collect();
     assert_eq!(prices, [100.0, 101.0, 100.5]);
 }

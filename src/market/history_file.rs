@@ -36,7 +36,7 @@ impl History {
             && common < declared
         {
             let message =
-                format!("most bars are {} s apart, but `interval` says {} s", common as f64 * 1e-9, declared as f64 * 1e-9);
+                format!("most bars are {} s apart, but `interval` says {} s", common as f64 / 1e9, declared as f64 / 1e9);
             return Err(InputError::new(table.path(), message).in_column("ts").hint("give the length of one bar"));
         }
         let spans = stamp.spans(&times, interval).ok_or_else(|| {
@@ -132,8 +132,10 @@ fn prices(table: &Table, name: &str, scale: f64) -> Result<Vec<Price>, InputErro
 /// One level of one side: none where it is not there.
 fn levels(table: &Table, price: &str, size: &str, scale: f64) -> Result<Vec<Option<Level>>, InputError> {
     let (prices, sizes) = (table.floats(price)?, table.floats(size)?);
-    check_not_negative(table, price, &prices)?;
-    check_not_negative(table, size, &sizes)?;
+    for (name, values) in [(price, &prices), (size, &sizes)] {
+        check_not_negative(table, name, values)
+            .map_err(|error| error.hint("0 or an empty cell is a side that is not there; drop the row or correct it"))?;
+    }
     let level = |(price, size): (Option<f64>, Option<f64>)| {
         let level = Level { price: price? * scale, size: size.unwrap_or(f64::INFINITY) };
         (level.price > 0.0 && level.size > 0.0).then_some(level)
