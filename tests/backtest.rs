@@ -9,6 +9,7 @@ use trueup::market::{
     Reference, Settings, Side, Status, Strategy, View, check_strategy,
 };
 use trueup::sim2real::{Assembly, Seed, Timestamp, Typical};
+use trueup::strategies;
 
 const MINUTE: i64 = 60 * Timestamp::NANOS;
 
@@ -364,6 +365,40 @@ fn a_strategy_that_decides_differently_twice_is_found_out() {
     let moods = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
     let error = check_strategy(|_| Box::new(Moody(moods.clone())), Seed(1)).unwrap_err();
     assert!(error.to_string().contains("two runs"), "{error}");
+}
+
+/// A whole run against one written apart from it in Python, in floating point and with numpy:
+///
+/// ```text
+/// close[k] = round(10000 + 1000 sin(k / 40) + 300 sin(k / 7)) cents, k = 0 .. 2999, a minute each; open[k] = close[k - 1]
+/// long 0.99 of equity in whole shares while sum(close[k-9..=k]) * 50 > sum(close[k-49..=k]) * 10, else flat
+/// fill at open[k + 1] +- 1 bp of close[k], to the cent against the order; fee 0.5 bps of the price before that cent
+/// r = e[1:] / e[:-1] - 1; n = len(r) / (2999 / 1440 / 365.25)
+/// volatility = r.std(ddof=1) sqrt(n); Sharpe = r.mean() / r.std(ddof=1) sqrt(n); drawdown = max(1 - e / max so far)
+/// ```
+#[test]
+fn a_run_is_as_computed_with_numpy() {
+    let cents = |k: i64| (10_000.0 + 1_000.0 * (k as f64 / 40.0).sin() + 300.0 * (k as f64 / 7.0).sin()).round() / 100.0;
+    let all = (0..3_000).map(|k| bar(k, cents((k - 1).max(0)), cents(k), 1e6)).collect();
+    let history = History::new(all, Quotes::default()).unwrap();
+    let settings = Settings::with_cash(Cash::nearest(1e6).unwrap());
+    let parts = [("half_spread", "bps", 1.0), ("commission", "bps", 0.5)];
+    let backtest = Backtest::new(vec![instrument("A")], vec![history], venue(&parts), settings).unwrap();
+    let table = toml::from_str("kind = 'sma_cross'\nfast = 10\nslow = 50").unwrap();
+    let record = backtest.run(strategies::build(&table).unwrap().as_mut()).unwrap();
+    let metrics = Metrics::of(&record).unwrap();
+    assert_eq!(record.blotter.fills.len(), 51);
+    for (found, expected) in [
+        (metrics.final_equity, 2_908_140.191_522_862),
+        (metrics.costs.fees, 4_289.718_477_138),
+        (metrics.returns.annualised_volatility.unwrap(), 1.676_775_950_807_108_7),
+        (metrics.returns.sharpe.unwrap(), 112.510_809_964_004_21),
+        (metrics.max_drawdown.unwrap().depth, 0.099_628_428_434_417_1),
+        (metrics.turnover.unwrap(), 49.364_240_172_344_545),
+    ] {
+        assert!((found - expected).abs() <= 1e-9 * expected, "{found} is not {expected}");
+    }
+    assert_eq!(metrics.max_drawdown.unwrap().trough_at, minute(1_962));
 }
 
 proptest! {

@@ -21,11 +21,23 @@ pub struct Daily {
     volumes: VecDeque<f64>,
     /// Closes of completed days, the newest last.
     closes: VecDeque<f64>,
+    /// As of the last completed day.
+    mean_volume: Option<f64>,
+    /// As of the last completed day.
+    volatility: Option<f64>,
 }
 
 impl Default for Daily {
     fn default() -> Self {
-        Self { next_day: i64::MIN, volume: 0.0, close: Price(0), volumes: VecDeque::new(), closes: VecDeque::new() }
+        Self {
+            next_day: i64::MIN,
+            volume: 0.0,
+            close: Price(0),
+            volumes: VecDeque::new(),
+            closes: VecDeque::new(),
+            mean_volume: None,
+            volatility: None,
+        }
     }
 }
 
@@ -57,6 +69,8 @@ impl Daily {
             while self.closes.len() > Self::DAYS + 1 {
                 self.closes.pop_front();
             }
+            self.mean_volume = self.mean_volume();
+            self.volatility = self.deviation();
         }
         self.volume = 0.0;
         self.next_day = (time.0 - 1).div_euclid(DAY).saturating_add(1).saturating_mul(DAY);
@@ -65,6 +79,10 @@ impl Daily {
     /// Mean volume of the last completed days [units]; none before the first has ended, or where there was none.
     #[must_use]
     pub fn volume(&self) -> Option<f64> {
+        self.mean_volume
+    }
+
+    fn mean_volume(&self) -> Option<f64> {
         let mean = self.volumes.iter().sum::<f64>() / self.volumes.len() as f64;
         (mean > 0.0).then_some(mean)
     }
@@ -72,6 +90,10 @@ impl Daily {
     /// Standard deviation of the log returns between the last completed days (a fraction); none with fewer than 5.
     #[must_use]
     pub fn volatility(&self) -> Option<f64> {
+        self.volatility
+    }
+
+    fn deviation(&self) -> Option<f64> {
         let returns: Vec<f64> = self.closes.iter().zip(self.closes.iter().skip(1)).map(|(a, b)| (b / a).ln()).collect();
         if returns.len() < Self::FEWEST_RETURNS {
             return None;

@@ -82,6 +82,8 @@ pub struct Venue<'d> {
     runs: Vec<Run<Execution>>,
     reference: Reference,
     averages: bool,
+    /// Row of each instrument's history that the last order met, or would have without a delay: later ones look on from it.
+    since: Vec<usize>,
     /// Orders on their way by when they meet the market, and which comes first at one time; and their places in `orders`.
     due: BinaryHeap<Reverse<(Timestamp, u64, usize)>>,
     orders: Vec<Waiting>,
@@ -108,7 +110,8 @@ impl<'d> Venue<'d> {
         let runs = symbols.iter().map(|symbol| assembly.run(&thetas, &still, seed.child(symbol))).collect();
         let (due, orders, free) = (BinaryHeap::new(), Vec::new(), Vec::new());
         let averages = assembly.modelled().contains(&"book_walk");
-        Self { histories, runs, reference, averages, due, orders, free, origin, messages: 0 }
+        let since = vec![0; histories.len()];
+        Self { histories, runs, reference, averages, since, due, orders, free, origin, messages: 0 }
     }
 
     /// Whether the prices it reports may be averages over several trades, which lie between ticks.
@@ -118,12 +121,15 @@ impl<'d> Venue<'d> {
     }
 
     /// The price an order of `side` for `instrument` would meet if it arrived as it is decided and nothing stood between:
-    /// what the backtest assumes [currency].
+    /// what the backtest assumes [currency]. Decisions come in the order of time.
     #[must_use]
-    pub fn assumed(&self, instrument: usize, side: Side, decided_at: Timestamp) -> Option<f64> {
+    pub fn assumed(&mut self, instrument: usize, side: Side, decided_at: Timestamp) -> Option<f64> {
         let history = self.histories.get(instrument)?;
-        match self.meets(history, side, decided_at, decided_at)?.1 {
-            Meeting::Bar(row) => history.bars().get(row).map(|bar| bar.open.to_f64()),
+        match self.meets(instrument, side, decided_at, decided_at)?.1 {
+            Meeting::Bar(row) => {
+                self.since[instrument] = row;
+                history.bars().get(row).map(|bar| bar.open.to_f64())
+            }
             Meeting::Quote(row) => self.reference.of(&history.quotes().all().get(row)?.book(), side),
         }
     }
@@ -133,8 +139,7 @@ impl<'d> Venue<'d> {
         let tick = self.tick(order.decided_at);
         let Some(run) = self.runs.get_mut(instrument) else { return false };
         let Some(order) = run.send(tick, order).first().copied() else { return false };
-        let history = &self.histories[instrument];
-        let met = self.meets(history, order.side, order.decided_at, order.arrives_at);
+        let met = self.meets(instrument, order.side, order.decided_at, order.arrives_at);
         let Some((time, meets)) = met else { return false };
         let waiting = Waiting { instrument, order, meets };
         let place = match self.free.pop() {
@@ -193,14 +198,16 @@ impl<'d> Venue<'d> {
     /// When and where an order meets the market.
     fn meets(
         &self,
-        history: &History,
+        instrument: usize,
         side: Side,
         decided_at: Timestamp,
         arrives_at: Timestamp,
     ) -> Option<(Timestamp, Meeting)> {
+        let history = self.histories.get(instrument)?;
         if history.quotes().is_empty() {
-            let row = history.bars().partition_point(|bar| bar.open_at < arrives_at);
-            return history.bars().get(row).map(|bar| (bar.open_at, Meeting::Bar(row)));
+            let bars = history.bars();
+            let row = first_from(self.since[instrument], bars.len(), |row| bars[row].open_at < arrives_at);
+            return bars.get(row).map(|bar| (bar.open_at, Meeting::Bar(row)));
         }
         let quotes = history.quotes().all();
         // What carries the stamp of the decision was known by then; what carries that of the arrival was not.
@@ -217,5 +224,41 @@ impl<'d> Venue<'d> {
         let index = self.messages;
         self.messages += 1;
         Tick { index, time: time.seconds_since(self.origin), step: 0.0 }
+    }
+}
+
+/// The first row from `start` on that is not `before`, or `rows` where all are: found in steps that double, for it is
+/// most often near.
+fn first_from(start: usize, rows: usize, before: impl Fn(usize) -> bool) -> usize {
+    let (mut low, mut step) = (start, 1);
+    while low + step <= rows && before(low + step - 1) {
+        low += step;
+        step *= 2;
+    }
+    let mut high = (low + step).min(rows);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if before(middle) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_row_is_found_from_anywhere_before_it() {
+        for rows in 0..40 {
+            for answer in 0..=rows {
+                for start in 0..=answer {
+                    assert_eq!(first_from(start, rows, |row| row < answer), answer, "from {start} of {rows}");
+                }
+            }
+        }
     }
 }
