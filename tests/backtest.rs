@@ -1,5 +1,6 @@
 //! The backtest as its users meet it: where orders fill, what they cost, and that the account adds up.
 
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 use std::collections::BTreeMap;
 
 use proptest::prelude::*;

@@ -1,5 +1,6 @@
 //! Bars and quotes from files: their two times, and every way in which a file can be wrong.
 
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 #![cfg(feature = "io")]
 
 use std::path::PathBuf;

@@ -25,11 +25,12 @@ mod price_assumption;
 mod quote;
 #[cfg(feature = "io")]
 mod run_log;
+mod session;
 mod strategy;
 mod tape;
 mod venue;
 
-pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Session, Settings};
+pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 pub use bar::{Bar, Stamp, common_spacing};
 pub use blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
 pub use book::{Book, Level, Walk};
@@ -50,6 +51,7 @@ pub use price_assumption::PriceAssumption;
 pub use quote::{Quote, QuoteSlice, Quotes};
 #[cfg(feature = "io")]
 pub use run_log::{InputHash, Provenance, RunSummary};
+pub use session::Session;
 pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
 pub use tape::{Print, Seen, Tape, TapeBar};
 pub use venue::{Answer, Reference, Venue};
