@@ -199,6 +199,21 @@ mod tests {
         assert_eq!(ledger.equity().unwrap(), ledger.cash());
     }
 
+    /// 74 were paid for 7 of the smallest units: 2 of them cost 21 and a seventh, which the other 5 keep.
+    #[test]
+    fn what_a_division_leaves_stays_with_the_rest() {
+        let mut ledger = Ledger::new(Cash::ZERO, 1);
+        let trade = |side, price, quantity| {
+            let (price, quantity) = (Price(price), Quantity(quantity));
+            Trade { instrument: 0, side, price, quantity, fee: Cash::ZERO }
+        };
+        ledger.book(&trade(Side::Buy, 10, 3)).unwrap();
+        ledger.book(&trade(Side::Buy, 11, 4)).unwrap();
+        assert_eq!(ledger.book(&trade(Side::Sell, 20, 2)).unwrap(), Cash(40 - 21));
+        assert_eq!(ledger.book(&trade(Side::Sell, 20, 5)).unwrap(), Cash(100 - 53));
+        assert_eq!((ledger.positions()[0].basis, ledger.cash()), (Cash::ZERO, Cash(140 - 74)));
+    }
+
     #[test]
     fn an_amount_that_does_not_fit_leaves_the_account_as_it_was() {
         let mut ledger = Ledger::new(Cash(i128::MIN + 10), 1);
