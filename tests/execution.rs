@@ -153,7 +153,7 @@ fn with(
 /// Largest distance between a measured and a simulated channel.
 fn worst(assembly: &Assembly<Execution>, recording: &Recording<OrderLog>, channel: &str) -> f64 {
     let values: Vec<f64> = assembly.parameters().iter().map(|p| p.nominal).collect();
-    let trajectory = assembly.rollout(&Thetas::single(&values), recording, recording.len(), Seed(1)).remove(0);
+    let trajectory = assembly.rollout(&Thetas::single(&values), recording, 0..recording.len(), Seed(1)).remove(0);
     let simulated = trajectory.into_iter().find(|s| s.channel == channel).unwrap().samples;
     let measured = &recording.channel(channel).unwrap().samples;
     measured.iter().zip(simulated).filter_map(|(m, s)| Some((m.as_ref()? - s).abs())).fold(0.0, f64::max)
@@ -212,7 +212,7 @@ fn without_prints_the_own_impact_is_met_by_a_delay_that_is_too_long() {
 fn a_cap_fills_the_part_of_the_displayed_size_it_allows() {
     let recording = full();
     let capped = with(bare(), &recording, "participation_cap", "", 0.5);
-    let trajectory = capped.rollout(&Thetas::single(&[0.5]), &recording, 3, Seed(1)).remove(0);
+    let trajectory = capped.rollout(&Thetas::single(&[0.5]), &recording, 0..3, Seed(1)).remove(0);
     // 90 are displayed on each side, so 45 can be filled of 20, 45 and 75.
     assert_eq!(trajectory[2].samples, [1.0, 1.0, 0.6]);
 }
@@ -222,7 +222,7 @@ fn impacts_are_what_their_laws_say() {
     let recording = full();
     let cost = |name: &str| {
         let assembly = with(bare(), &recording, name, "", 100.0);
-        assembly.rollout(&Thetas::single(&[100.0]), &recording, 1, Seed(1)).remove(0)[0].samples[0]
+        assembly.rollout(&Thetas::single(&[100.0]), &recording, 0..1, Seed(1)).remove(0)[0].samples[0]
     };
     let participation = 20.0 / 1e6_f64;
     assert!((cost("sqrt_impact") - 100.0 * participation.sqrt()).abs() < 1e-9);
@@ -266,14 +266,14 @@ fn resolutions_are_those_of_tick_cent_and_lot() {
 #[test]
 fn covariates_have_a_value_an_order_and_rank_the_future_last() {
     let recording = full();
-    let covariates = Execution::covariates(&recording);
+    let covariates = Execution.covariates(&recording);
     assert_eq!(covariates.len(), 17);
     assert!(covariates.iter().all(|(_, values)| values.len() == recording.len() && values.iter().all(|v| v.is_finite())));
     let of = |name: &str| covariates.iter().find(|(n, _)| *n == name).unwrap().1[..3].to_vec();
     assert_eq!(of("quantity / size at the touch"), [20.0 / 30.0, 1.5, 2.5]);
     assert!(of("gap to the second level").iter().all(|gap| (gap - 0.02).abs() < 1e-9));
     assert!(covariates[15].0.ends_with("after") && covariates[16].0.ends_with("after"));
-    assert!(Execution::covariates(&on_bars(PriceAssumption::BarClose)).iter().all(|(name, _)| !name.contains("touch")));
+    assert!(Execution.covariates(&on_bars(PriceAssumption::BarClose)).iter().all(|(name, _)| !name.contains("touch")));
 }
 
 #[test]
@@ -302,8 +302,13 @@ fn orders_off_the_tape_are_an_error_that_says_by_how_much() {
         log(tape(), PriceAssumption::Mid, &orders, &[]).unwrap_err().to_string()
     };
     let early = shifted(-5 * 3600);
-    assert!(early.contains("40 of 40 orders are outside the tape; this one is decided 18000 s before the tape begins"), "{early}");
-    assert!(early.contains("row 1, column `decided_at`") && early.contains("hint: is one of the files in another zone, 5 h"));
+    assert!(
+        early.contains("40 of 40 orders are outside the tape; this one is decided 18000.000 s before the tape begins"),
+        "{early}"
+    );
+    assert!(
+        early.contains("row 1, column `decided_at`") && early.contains("hint: is one of the files in another zone, 5 h")
+    );
     assert!(shifted(4 * 3600).contains("after the tape ends"));
     assert!(shifted(-1_600_000_000).contains("time_unit"));
     let nothing = log(Tape::default(), PriceAssumption::Mid, &orders(), &[]).unwrap_err().to_string();

@@ -73,6 +73,9 @@ fn check_each(
     let broken = values.iter().enumerate().find_map(|(row, value)| value.filter(|v| !holds(*v)).map(|v| (row, v)));
     match broken {
         None => Ok(()),
-        Some((row, value)) => Err(table.error(column, row, format!("expected {expected}")).found(value)),
+        Some((row, value)) => Err(table
+            .error(column, row, format!("expected {expected}"))
+            .found(value)
+            .hint("correct the value or drop the row; is another column meant?")),
     }
 }

@@ -1,16 +1,18 @@
 //! Parquet and Arrow files; the only place, with [`write`](super::write), that knows the data-frame library.
 
 use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use chrono::{DateTime, NaiveDateTime};
 use polars::prelude::{
     ArrowDataType, DataFrame, DataType, IpcReader, ParquetReader, PolarsResult, SerReader, Series, TimeUnit as PolarsUnit,
-    TimeZone,
+    TimeZone, polars_ensure,
 };
 
 use super::error::InputError;
+use super::parquet_pages::pages_agree;
 
 /// The values of one column, in the few types that recordings are made of.
 pub(super) enum Column {
@@ -94,6 +96,7 @@ fn first_line(text: &str) -> String {
 }
 
 fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
+    let (size, again) = (file.metadata()?.len(), file.try_clone()?);
     let mut parquet = None;
     let mut arrow = None;
     let schema = match container {
@@ -105,16 +108,48 @@ fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
         let name = field.name.to_string();
         match readable(&field.dtype) {
             true => wanted.push(name.clone()),
-            false => left_out.push((name.clone(), format!("{:?}", field.dtype))),
+            false => left_out.push((name.clone(), type_name(&field.dtype))),
         }
         names.push(name);
     }
     let frame = match (parquet, arrow) {
-        (Some(reader), _) => reader.with_columns(Some(wanted)).finish()?,
+        (Some(mut reader), _) => {
+            check_counts(&mut reader, again, size)?;
+            reader.with_columns(Some(wanted)).finish()?
+        }
         (None, Some(reader)) => reader.with_columns(Some(wanted)).finish()?,
         (None, None) => DataFrame::empty(),
     };
     Ok(ColumnarFile { frame, names, left_out })
+}
+
+/// Holds the counts of a Parquet footer and of the page headers to agree with each other and with the size of the file
+/// [bytes].
+fn check_counts(reader: &mut ParquetReader<File>, mut file: File, size: u64) -> PolarsResult<()> {
+    let footer = reader.get_metadata()?;
+    let rows = footer.row_groups.iter().try_fold(0_usize, |sum, group| sum.checked_add(group.num_rows()));
+    polars_ensure!(rows == Some(footer.num_rows), ComputeError: "its row counts contradict each other");
+    for group in &footer.row_groups {
+        for chunk in group.parquet_columns() {
+            // A column of lists has more values than rows.
+            let flat = chunk.descriptor().descriptor.max_rep_level == 0;
+            let range = chunk.byte_range();
+            let fits = range.start <= range.end && range.end <= size;
+            let counted = !flat || usize::try_from(chunk.num_values()) == Ok(group.num_rows());
+            polars_ensure!(fits && counted, ComputeError: "its footer contradicts its size");
+            let mut bytes = Vec::new();
+            file.seek(SeekFrom::Start(range.start))?;
+            (&mut file).take(range.end - range.start).read_to_end(&mut bytes)?;
+            polars_ensure!(pages_agree(&bytes, chunk.num_values()), ComputeError: "its pages contradict its footer");
+        }
+    }
+    Ok(())
+}
+
+/// The name of a type, without what is within it.
+fn type_name(kind: &ArrowDataType) -> String {
+    let name = format!("{kind:?}");
+    format!("the type {}", name.split(['(', '{']).next().unwrap_or_default().trim())
 }
 
 /// Whether columns of that type are read; the data-frame library is built without the others, and panics at them.
@@ -164,7 +199,7 @@ fn values(series: &Series) -> PolarsResult<Column> {
             Column::Naive(days.i32()?.iter().map(|v| v.and_then(midnight)).collect())
         }
         DataType::Datetime(unit, zone) => instants(series, *unit, zone.is_some())?,
-        other => Column::Other(other.to_string()),
+        other => Column::Other(format!("the type {other}")),
     })
 }
 

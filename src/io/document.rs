@@ -122,12 +122,15 @@ impl Document {
         }
         if message.starts_with("missing field") {
             let word = quoted.next().unwrap_or_default();
-            return error(format!("the key `{word}` is missing")).hint(format!("add `{word} = ...` to this section"));
+            return error(format!("the key `{word}` is missing"))
+                .hint(format!("add `{word} = ...` or a section `[{word}]`"));
         }
         if let Some(mismatch) = message.strip_prefix("invalid type: ").or_else(|| message.strip_prefix("invalid value: "))
             && let Some((found, expected)) = mismatch.split_once(", expected ")
         {
-            return error(format!("expected {}", in_prose(expected))).found(found).maybe_hint(own_hint);
+            return error(format!("expected {}", in_prose(expected)))
+                .found(found)
+                .maybe_hint(own_hint.or_else(|| remedy(found, expected)));
         }
         error(message.trim().replace('\n', ", ")).maybe_hint(own_hint)
     }
@@ -135,6 +138,16 @@ impl Document {
 
 /// Divides message and hint in errors that the documents' own types raise within the TOML library.
 pub(super) const HINT: &str = "\nhint: ";
+
+/// What to do about a value of the wrong type, where that is clear.
+fn remedy(found: &str, expected: &str) -> Option<String> {
+    let number = matches!(expected, "f64" | "i64" | "u64" | "u32" | "usize") || expected.starts_with("a number");
+    match found {
+        text if text.starts_with("string") && number => Some("write numbers without quotes and without a unit".to_owned()),
+        _ if expected == "a string" => Some("write texts in quotes".to_owned()),
+        _ => None,
+    }
+}
 
 /// Rust's names of types in words a user knows.
 fn in_prose(expected: &str) -> &str {
@@ -182,13 +195,16 @@ mod tests {
         ");
         insta::assert_snapshot!(error("[run]\nseed = 1\n"), @"
         run.toml:1:1: the key `cash` is missing
-          hint: add `cash = ...` to this section
+          hint: add `cash = ...` or a section `[cash]`
         ");
-        insta::assert_snapshot!(error("[run]\nseed = 1\ncash = 'much'\n"), @r#"run.toml:3:8: expected a number, found string "much""#);
+        insta::assert_snapshot!(error("[run]\nseed = 1\ncash = 'much'\n"), @r#"
+        run.toml:3:8: expected a number, found string "much"
+          hint: write numbers without quotes and without a unit
+        "#);
         insta::assert_snapshot!(error("[run]\nseed = -1\ncash = 1\n"), @"run.toml:2:8: expected an integer, 0 or more, found integer `-1`");
-        insta::assert_snapshot!(error("[run\nseed = 1\n"), @"");
-        insta::assert_snapshot!(error("run = 3\n"), @"");
-        insta::assert_snapshot!(error("[run]\nseed = 1\nseed = 2\n"), @"");
+        insta::assert_snapshot!(error("[run\nseed = 1\n"), @"run.toml:1:5: unclosed table, expected `]`");
+        insta::assert_snapshot!(error("run = 3\n"), @"run.toml:1:7: expected a table, found integer `3`");
+        insta::assert_snapshot!(error("[run]\nseed = 1\nseed = 2\n"), @"run.toml:3:1: duplicate key");
     }
 
     #[test]

@@ -32,13 +32,13 @@ pub struct InputError {
     /// Where in the file.
     pub place: Place,
     /// Column, by the name it has in the file.
-    pub column: Option<String>,
+    pub column: Option<Box<str>>,
     /// What is wrong.
     pub message: String,
     /// The value found, as it is shown (text in quotes).
-    pub found: Option<String>,
+    pub found: Option<Box<str>>,
     /// What to do about it.
-    pub hint: Option<String>,
+    pub hint: Option<Box<str>>,
 }
 
 impl InputError {
@@ -65,14 +65,14 @@ impl InputError {
     /// Names the column, as the file does.
     #[must_use]
     pub fn in_column(mut self, column: impl Into<String>) -> Self {
-        self.column = Some(column.into());
+        self.column = Some(column.into().into());
         self
     }
 
     /// Gives the value found.
     #[must_use]
     pub fn found(mut self, value: impl fmt::Display) -> Self {
-        self.found = Some(value.to_string());
+        self.found = Some(value.to_string().into());
         self
     }
 
@@ -88,14 +88,14 @@ impl InputError {
     /// Gives the remedy.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.hint = Some(hint.into());
+        self.hint = Some(hint.into().into());
         self
     }
 
     /// Gives the remedy, where there is one.
     #[must_use]
     pub fn maybe_hint(mut self, hint: Option<String>) -> Self {
-        self.hint = hint.or(self.hint);
+        self.hint = hint.map(Into::into).or(self.hint);
         self
     }
 }
@@ -124,7 +124,7 @@ impl fmt::Display for InputError {
 /// The candidate most like `word`, where one is like enough to be meant.
 ///
 /// Likeness is the Damerau-Levenshtein distance, without regard to case: at most a third of the longer word may
-/// differ, or one word must begin with the other.
+/// differ (of very short words one letter, if another stays), or one word must begin with the other.
 #[must_use]
 pub fn did_you_mean<C: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = C>) -> Option<String> {
     let word = word.to_lowercase();
@@ -135,7 +135,7 @@ pub fn did_you_mean<C: AsRef<str>>(word: &str, candidates: impl IntoIterator<Ite
             let distance = strsim::damerau_levenshtein(&word, &other);
             let longer = word.chars().count().max(other.chars().count());
             let begins = word.len().min(other.len()) >= 3 && (word.starts_with(&other) || other.starts_with(&word));
-            (3 * distance <= longer.max(3) || begins).then(|| (distance, candidate.as_ref().to_owned()))
+            (distance < longer && 3 * distance <= longer.max(3) || begins).then(|| (distance, candidate.as_ref().to_owned()))
         })
         .min_by(|a, b| a.cmp(b))
         .map(|(_, candidate)| candidate)
@@ -190,6 +190,7 @@ mod tests {
         assert_eq!(did_you_mean("coulomb_frcition", ids).as_deref(), Some("coulomb_friction"));
         assert_eq!(did_you_mean("Coulomb", ids).as_deref(), Some("coulomb_friction"));
         assert_eq!(did_you_mean("gravity", ids), None);
+        assert_eq!(did_you_mean("t", ["q", "u", "time"]), None);
         assert_eq!(did_you_mean("pso", ["position", "velocity"]), None);
         assert_eq!(did_you_mean("bidd", ["ask", "bid", "bid2"]).as_deref(), Some("bid"));
         assert_eq!(hint_among("zzz", &["a", "b", "c"]).as_deref(), Some("there are `a`, `b` and `c`"));

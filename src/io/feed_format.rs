@@ -71,7 +71,10 @@ impl FeedFormat {
         }
         if !self.price_scale.is_finite() || self.price_scale <= 0.0 {
             let keys: Vec<&str> = keys.iter().copied().chain(["price_scale"]).collect();
-            return Err(document.error(&keys, "expected a finite number greater than 0").found(self.price_scale));
+            return Err(document
+                .error(&keys, "expected a finite number greater than 0")
+                .found(self.price_scale)
+                .hint("a price in the file times `price_scale` is the price: 1e-4 for prices x10000"));
         }
         Ok(())
     }
@@ -82,7 +85,7 @@ pub(super) fn check_file(document: &Document, keys: &[&str], named: &str) -> Res
     open(&document.resolve(named)).map(drop).map_err(|error| {
         document
             .error(keys, format!("names the file {named}, but {}", error.message))
-            .maybe_hint(error.hint.or_else(|| Some("paths start from the folder of this document".to_owned())))
+            .hint(error.hint.as_deref().unwrap_or("paths start from the folder of this document"))
     })
 }
 

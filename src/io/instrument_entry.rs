@@ -40,7 +40,8 @@ pub(super) fn check_instruments(document: &Document, instruments: &[InstrumentEn
             if let Some(value) = value.filter(|v| !v.is_finite() || *v <= 0.0) {
                 return Err(document
                     .error(&["instrument", &number, key], "expected a finite number greater than 0")
-                    .found(value));
+                    .found(value)
+                    .hint("correct the value, or leave the key out where it may be"));
             }
         }
         if instruments[..index].iter().any(|earlier| earlier.symbol == instrument.symbol) {

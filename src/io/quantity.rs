@@ -48,7 +48,10 @@ impl Quantity {
     /// Holds value and uncertainty, which stand at `keys`, to be finite, and the uncertainty not to be negative.
     pub(super) fn check(&self, document: &Document, keys: &[&str]) -> Result<(), InputError> {
         if !self.value.is_finite() {
-            return Err(document.error(keys, "expected a finite number").found(self.value));
+            return Err(document
+                .error(keys, "expected a finite number")
+                .found(self.value)
+                .hint("a twin needs a nominal value, if only a rough one"));
         }
         if !self.uncertainty.is_finite() || self.uncertainty < 0.0 {
             let keys: Vec<&str> = keys.iter().copied().chain(["uncertainty"]).collect();

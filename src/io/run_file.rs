@@ -149,12 +149,15 @@ impl RunFile {
         let RunTable { run, instrument, data, strategy, mechanism } = document.parse()?;
         if !run.cash.is_finite() || run.cash < 0.0 {
             let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
-            return Err(error.found(run.cash));
+            return Err(error.found(run.cash).hint("it is what the run starts with"));
         }
         if let (Some(start), Some(end)) = (run.start, run.end)
             && start >= end
         {
-            return Err(document.error(&["run", "end"], format!("expected an end after the start, {start}")).found(end));
+            return Err(document
+                .error(&["run", "end"], format!("expected an end after the start, {start}"))
+                .found(end)
+                .hint("swap or correct them"));
         }
         check_instruments(&document, &instrument)?;
         check_mechanisms(&document, &mechanism)?;

@@ -63,7 +63,7 @@ fn nearest_file(path: &Path) -> Option<String> {
 }
 
 /// All bytes of a file.
-pub(super) fn bytes(path: &Path, mut file: impl Read) -> Result<Vec<u8>, InputError> {
+pub(super) fn bytes(path: &Path, mut file: File) -> Result<Vec<u8>, InputError> {
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).map_err(|error| InputError::new(path, format!("cannot be read ({error})")))?;
     Ok(bytes)
@@ -71,8 +71,10 @@ pub(super) fn bytes(path: &Path, mut file: impl Read) -> Result<Vec<u8>, InputEr
 
 /// All bytes of a file, decompressed.
 pub(super) fn unzip(path: &Path, file: File) -> Result<Vec<u8>, InputError> {
-    bytes(path, flate2::read::MultiGzDecoder::new(file)).map_err(|error| {
-        InputError::new(path, format!("expected a whole gzip file ({})", error.message))
+    let mut bytes = Vec::new();
+    flate2::read::MultiGzDecoder::new(file).read_to_end(&mut bytes).map_err(|error| {
+        InputError::new(path, format!("expected a whole gzip file ({error})"))
             .hint("the file is truncated, corrupt or not compressed: copy or write it again")
-    })
+    })?;
+    Ok(bytes)
 }

@@ -166,7 +166,9 @@ impl Table {
                 .enumerate()
                 .map(|(row, value)| match value.filter(|v| !v.is_nan()) {
                     None => Ok(None),
-                    Some(v) => as_integer(v).map(Some).ok_or_else(|| self.error(name, row, NO_INTEGER.0).found(v)),
+                    Some(v) => as_integer(v)
+                        .map(Some)
+                        .ok_or_else(|| self.error(name, row, NO_INTEGER.0).found(v).hint(NO_INTEGER.1)),
                 })
                 .collect(),
             Cells::Typed(other) => Err(self.wrong_type(name, "integers", &other)),
@@ -280,28 +282,29 @@ impl Table {
             [only] if only.contains(';') || only.contains('\t') => {
                 "cells are separated by commas; was the file written with another separator?".to_owned()
             }
-            _ => format!("{meant}the file has the {has} {}", listed(names)),
+            _ if meant.is_empty() => format!("the file has the {has} {}", listed(names)),
+            _ => format!("{meant}The file has the {has} {}", listed(names)),
         };
         error.hint(hint)
     }
 
     fn wrong_type(&self, name: &str, expected: &str, found: &Column) -> InputError {
-        let (kind, hint) = match found {
-            Column::Floats(_) | Column::Integers(_) => ("numbers", None),
-            Column::Booleans(_) => ("true and false", None),
-            Column::Texts(_) => ("texts", None),
-            Column::Instants(_) | Column::Naive(_) => ("times", None),
-            Column::Other(kind) => (kind.as_str(), Some("write it as 64-bit numbers, texts or timestamps")),
+        let kind = match found {
+            Column::Floats(_) | Column::Integers(_) => "numbers",
+            Column::Booleans(_) => "true and false",
+            Column::Texts(_) => "texts",
+            Column::Instants(_) | Column::Naive(_) => "times",
+            Column::Other(kind) => kind.as_str(),
         };
-        InputError::new(&self.path, format!("expected {expected}"))
-            .in_column(self.own_name(name))
-            .found(kind)
-            .maybe_hint(hint.map(str::to_owned))
+        let hint = match found {
+            Column::Other(_) => "write it as 64-bit numbers, texts or timestamps",
+            _ => "is another column meant?",
+        };
+        InputError::new(&self.path, format!("expected {expected}")).in_column(self.own_name(name)).found(kind).hint(hint)
     }
 
     fn cell_error(&self, name: &str, row: usize, (message, hint): (&str, &str), text: &str) -> InputError {
-        let error = self.error(name, row, message).found_text(text);
-        if hint.is_empty() { error } else { error.hint(hint) }
+        self.error(name, row, message).found_text(text).hint(hint)
     }
 
     fn complete<T>(&self, name: &str, cells: Vec<Option<T>>, what: &str) -> Result<Vec<T>, InputError> {
@@ -333,7 +336,7 @@ fn each<V, T>(
 type Wrong = (&'static str, &'static str);
 const INFINITE: Wrong = ("expected a finite number", "leave the cell empty where a sample was lost");
 const NO_NUMBER: Wrong = ("expected a number", "leave the cell empty where a sample was lost");
-const NO_INTEGER: Wrong = ("expected an integer", "");
+const NO_INTEGER: Wrong = ("expected an integer", "round the column, or write it without a fraction");
 
 fn number(text: &str) -> Result<Option<f64>, Wrong> {
     if text.is_empty() {

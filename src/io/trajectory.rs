@@ -76,7 +76,9 @@ pub fn read_trajectory(path: impl AsRef<Path>, columns: &[(&str, &str, Need)]) -
             Need::SomeRows | Need::Nothing => table.floats(column)?,
         };
         if *need == Need::SomeRows && values.iter().all(Option::is_none) {
-            return Err(InputError::new(table.path(), "expected at least one number, found none").in_column(*column));
+            return Err(InputError::new(table.path(), "expected at least one number, found none")
+                .in_column(*column)
+                .hint("every sample is lost: name another column, or leave the channel out"));
         }
         read.push(((*role).to_owned(), values));
     }

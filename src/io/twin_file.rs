@@ -243,7 +243,7 @@ fn check_assumptions(document: &Document, assumptions: &Assumptions) -> Result<(
     let costs = [("commission_bps", assumptions.commission_bps), ("commission_per_share", assumptions.commission_per_share)];
     for (key, value) in costs {
         if let Some(value) = value.filter(|v| !v.is_finite()) {
-            return Err(document.error(&["assumptions", key], "expected a finite number").found(value));
+            return Err(document.error(&["assumptions", key], "expected a finite number").found(value).hint("0 for none"));
         }
     }
     if costs.iter().all(|(_, value)| value.is_some()) {

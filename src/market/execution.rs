@@ -1,7 +1,9 @@
 //! `execution`: the plant an order meets. As it stands it fills every order whole at the price the twin assumes; what
 //! that leaves out are mechanisms.
 
-use crate::sim2real::{Channel, Clock, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical};
+use crate::sim2real::{
+    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+};
 
 use super::{Book, InFlight, OrderLog, Side};
 
@@ -108,8 +110,20 @@ impl Plant for Execution {
         }
     }
 
-    fn initial_parameters(&self, _recording: &Recording<OrderLog>) -> Vec<Parameter> {
+    fn initial_parameters(&self, _recording: &Recording<OrderLog>, _row: usize) -> Vec<Parameter> {
         Vec::new()
+    }
+
+    fn resolution(&self, recording: &Recording<OrderLog>, channel: &str) -> f64 {
+        Self::resolution_of(recording, channel)
+    }
+
+    fn covariates(&self, recording: &Recording<OrderLog>) -> Vec<Covariate> {
+        super::covariate::covariates(recording)
+    }
+
+    fn notes(&self, recording: &Recording<OrderLog>) -> Vec<String> {
+        recording.stimulus.notes().to_vec()
     }
 
     fn dynamics(&self, _thetas: &Thetas) -> Self {
@@ -138,13 +152,6 @@ impl Execution {
             _ => 0.0,
         };
         median(recording.stimulus.orders().iter().map(of).collect()).unwrap_or(0.0)
-    }
-
-    /// What the residuals of a log may depend on, by name, one value an order; the order is that in which a dependence
-    /// is to be believed, and what follows the decision comes last.
-    #[must_use]
-    pub fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, Vec<f64>)> {
-        super::covariate::covariates(recording)
     }
 }
 

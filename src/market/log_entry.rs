@@ -133,7 +133,7 @@ pub fn fills_of_orders<'a>(orders: &[LoggedOrder], fills: &'a [LoggedFill]) -> R
         if fill.filled_at < order.decided_at {
             let early = order.decided_at.seconds_since(fill.filled_at);
             return Err(fail(
-                &format!("order {:?} is filled {early} s before it was decided ({})", order.id, order.decided_at),
+                &format!("order {:?} is filled {early:.9} s before it was decided ({})", order.id, order.decided_at),
                 "are both columns in the same zone and unit, and from the same clock?",
             )
             .at(row, "filled_at", fill.filled_at));
@@ -221,7 +221,7 @@ mod tests {
           hint: each fill names a row of orders: are both files of one log?
         "#);
         insta::assert_snapshot!(error(&a, &[fill("a", 999_999_900, 1.0)]), @r#"
-        fills: row 1, column `filled_at`: order "a" is filled 0.0000001 s before it was decided (1970-01-01T00:00:01Z), found 1970-01-01T00:00:00.999999900Z
+        fills: row 1, column `filled_at`: order "a" is filled 0.000000100 s before it was decided (1970-01-01T00:00:01Z), found 1970-01-01T00:00:00.999999900Z
           hint: are both columns in the same zone and unit, and from the same clock?
         "#);
         insta::assert_snapshot!(error(&a, &[fill("a", later, 6.0), fill("a", later, 5.0)]), @r#"

@@ -15,6 +15,8 @@ mod history_file;
 mod instrument;
 mod ledger;
 mod log_entry;
+#[cfg(feature = "io")]
+mod log_folder;
 pub mod mechanism;
 pub mod metric;
 mod money;
@@ -28,6 +30,10 @@ mod run_log;
 mod session;
 mod strategy;
 mod tape;
+#[cfg(feature = "io")]
+mod tape_file;
+#[cfg(feature = "io")]
+mod twin;
 mod venue;
 
 pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
@@ -42,6 +48,8 @@ pub use history::{History, HistoryError};
 pub use instrument::Instrument;
 pub use ledger::{Ledger, Position, Trade};
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
+#[cfg(feature = "io")]
+pub use log_folder::{LogSettings, read_log};
 pub use mechanism::MECHANISMS;
 pub use money::{Cash, Increments, MoneyError, Price, Quantity};
 pub use order::{InFlight, Posted, Side};
@@ -55,3 +63,7 @@ pub use session::Session;
 pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
 pub use tape::{Print, Seen, Tape, TapeBar};
 pub use venue::{Answer, Reference, Venue};
+#[cfg(feature = "io")]
+pub use tape_file::{TapeFiles, read_tape};
+#[cfg(feature = "io")]
+pub use twin::{execution_assembly, execution_logs, execution_twin};

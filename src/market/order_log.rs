@@ -173,10 +173,12 @@ impl Stimulus<Execution> for OrderLog {
     fn input(&self, row: usize, arriving: &InFlight) -> Met {
         let seen = Seen::by(arriving, self.own_prints[row]);
         let tape = self.tape();
+        let book = tape.book(seen);
         // Where the tape has ended or shows one side only, the assumption stays as it was at the decision.
-        let reference = self.market.price.price(tape, arriving.side, seen).unwrap_or(arriving.assumed);
-        let book = tape.book(seen).unwrap_or_else(|| Book::at_price(seen.end(), reference));
-        Met { book, reference, volume: tape.volume(arriving.side, seen) }
+        let price = self.market.price.price_beside(book.as_ref(), tape, arriving.side, seen);
+        let reference = price.unwrap_or(arriving.assumed);
+        let volume = tape.volume_beside(book.as_ref(), arriving.side, seen);
+        Met { book: book.unwrap_or_else(|| Book::at_price(seen.end(), reference)), reference, volume }
     }
 }
 
@@ -276,7 +278,7 @@ fn on_tape(
             ..LogError::of(
                 LogTable::Orders,
                 format!(
-                    "{} of {count} orders are outside the tape; this one is decided {seconds} s {end} ({from})",
+                    "{} of {count} orders are outside the tape; this one is decided {seconds:.3} s {end} ({from})",
                     outside.len()
                 ),
                 outside_hint(seconds),

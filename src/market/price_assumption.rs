@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Seen, Side, Tape};
+use super::{Book, Seen, Side, Tape};
 
 /// Which price a twin assumes, as `[assumptions] price` names it: the one in force when an order was decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -55,9 +55,14 @@ impl PriceAssumption {
     /// The price as it stands for an order of `side` that has `seen` that much of `tape` [currency], where it is known.
     #[must_use]
     pub fn price(self, tape: &Tape, side: Side, seen: Seen) -> Option<f64> {
+        self.price_beside(tape.book(seen).as_ref(), tape, side, seen)
+    }
+
+    /// The same, for whoever has looked the book up already.
+    pub(super) fn price_beside(self, book: Option<&Book>, tape: &Tape, side: Side, seen: Seen) -> Option<f64> {
         match self {
-            Self::Mid => tape.book(seen)?.mid(),
-            Self::Touch => tape.book(seen)?.touch(side),
+            Self::Mid => book?.mid(),
+            Self::Touch => book?.touch(side),
             Self::Last => tape.last_price(seen),
             Self::BarClose => tape.bar_close(seen),
             Self::NextOpen => tape.next_open(seen),

@@ -172,6 +172,11 @@ impl Tape {
     /// is traded in the minute that begins with its arrival.
     #[must_use]
     pub fn volume(&self, side: Side, seen: Seen) -> f64 {
+        self.volume_beside(self.book(seen).as_ref(), side, seen)
+    }
+
+    /// The same, for whoever has looked the book up already.
+    pub(super) fn volume_beside(&self, book: Option<&Book>, side: Side, seen: Seen) -> f64 {
         const MINUTE: i64 = 60 * Timestamp::NANOS;
         let end = seen.end();
         if !self.bars.is_empty() {
@@ -179,7 +184,7 @@ impl Tape {
             return self.bars.get(within).filter(|bar| bar.open_at <= end).map_or(0.0, |bar| bar.volume);
         }
         if !self.quotes.is_empty() {
-            return self.book(seen).map_or(0.0, |book| book.displayed(side));
+            return book.map_or(0.0, |book| book.displayed(side));
         }
         if self.prints.is_empty() {
             return f64::INFINITY;

@@ -1,11 +1,12 @@
 //! A plant and its mechanisms, put together and run.
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    Candidate, Channel, Clock, Dynamics, Law, Mechanism, Observation, Parameter, Plant, Recording, Seed, Simulated,
-    Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+    Candidate, Channel, Clock, Covariate, Dynamics, Law, Mechanism, Observation, Parameter, Plant, Recording, Seed,
+    Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
 };
 
 /// The mechanisms a domain knows: one row each.
@@ -185,38 +186,87 @@ impl<P: Plant> Simulator for Assembly<P> {
         &self.parameters
     }
 
-    fn initial_parameters(&self, recording: &Recording<P::Stimulus>) -> Vec<Parameter> {
-        self.plant.initial_parameters(recording)
+    fn clock(&self) -> Clock {
+        self.plant.clock()
     }
 
-    fn rollout(&self, thetas: &Thetas, recording: &Recording<P::Stimulus>, rows: usize, seed: Seed) -> Vec<Trajectory> {
+    fn initial_parameters(&self, recording: &Recording<P::Stimulus>, row: usize) -> Vec<Parameter> {
+        self.plant.initial_parameters(recording, row)
+    }
+
+    fn resolution(&self, recording: &Recording<P::Stimulus>, channel: &str) -> f64 {
+        self.plant.resolution(recording, channel)
+    }
+
+    fn covariates(&self, recording: &Recording<P::Stimulus>) -> Vec<Covariate> {
+        self.plant.covariates(recording)
+    }
+
+    fn notes(&self, recording: &Recording<P::Stimulus>) -> Vec<String> {
+        self.plant.notes(recording)
+    }
+
+    fn unit(&self, declared: &str) -> String {
+        self.plant.unit(declared)
+    }
+
+    fn rollout(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<P::Stimulus>,
+        rows: Range<usize>,
+        seed: Seed,
+    ) -> Vec<Trajectory> {
         let own = self.parameters.len();
         let mut run = self.run(&thetas.block(0, own), &thetas.block(own, thetas.parameters() - own), seed);
-        let mut out = Follow::new(self.channels(), thetas.lanes(), rows);
-        let mut index = 0;
-        for row in 0..rows {
+        let mut out = Follow::new(self.channels(), thetas.lanes(), rows.len());
+        match self.plant.clock() {
+            Clock::Event => self.follow_events(&mut run, recording, rows, &mut out),
+            Clock::Sampled { .. } => self.follow_samples(&mut run, recording, rows, &mut out),
+        }
+        out.trajectories
+    }
+}
+
+/// How long before the first row followed the command laws see the commands already [s]: what is on its way then is not
+/// lost, whatever row a run starts from.
+const WARM_UP: f64 = 2.0;
+
+impl<P: Plant> Assembly<P> {
+    /// Rows are samples: the observation of a row is taken before its command acts.
+    fn follow_samples(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
+        let since = recording.time[rows.start] - WARM_UP;
+        let warm = recording.time[..rows.start].partition_point(|t| *t < since);
+        for row in warm..rows.end {
             let time = recording.time[row];
-            let command = recording.stimulus.command(row);
-            let interval = recording.time.get(row + 1).map_or(0.0, |next| next - time);
-            if let Clock::Sampled { .. } = self.plant.clock() {
+            if row >= rows.start {
                 out.record(run.observe(time));
             }
-            if row + 1 == rows && self.plant.clock() != Clock::Event {
+            if row + 1 == rows.end {
                 break;
             }
+            let command = recording.stimulus.command(row);
+            let interval = recording.time[row + 1] - time;
             let substeps = self.plant.clock().substeps(interval);
             let step = interval / substeps as f64;
             for sub in 0..substeps {
-                let tick = Tick { index, time: time + sub as f64 * step, step };
+                let tick = Tick { index: row, time: time + sub as f64 * step, step };
                 run.send(tick, &command);
-                run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
-                index += 1;
-            }
-            if self.plant.clock() == Clock::Event {
-                out.record(run.observe(time));
+                if row >= rows.start {
+                    run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
+                }
             }
         }
-        out.trajectories
+    }
+
+    /// Rows are messages: the observation of a row is the reply to its command.
+    fn follow_events(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
+        for row in rows {
+            let tick = Tick { index: row, time: recording.time[row], step: 0.0 };
+            run.send(tick, &recording.stimulus.command(row));
+            run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
+            out.record(run.observe(tick.time));
+        }
     }
 }
 

@@ -99,12 +99,12 @@ pub fn check_mechanism<P: Plant>(
 /// The values all parameters begin with: the plant's nominal, then `mechanism`, then the initial state's nominal.
 fn start<P: Plant>(assembly: &Assembly<P>, recording: &Recording<P::Stimulus>, mechanism: &[f64]) -> Vec<f64> {
     let plant = assembly.plant().parameters().into_iter().map(|p| p.nominal);
-    let initial = assembly.initial_parameters(recording).into_iter().map(|p| p.nominal);
+    let initial = assembly.initial_parameters(recording, 0).into_iter().map(|p| p.nominal);
     plant.chain(mechanism.iter().copied()).chain(initial).collect()
 }
 
 fn follow<P: Plant>(assembly: &Assembly<P>, recording: &Recording<P::Stimulus>, lanes: &[Vec<f64>]) -> Vec<Trajectory> {
-    assembly.rollout(&Thetas::from_lanes(lanes), recording, recording.len(), Seed(1))
+    assembly.rollout(&Thetas::from_lanes(lanes), recording, 0..recording.len(), Seed(1))
 }
 
 fn lanes_are_independent<P: Plant>(

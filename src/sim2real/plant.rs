@@ -2,6 +2,9 @@
 
 use super::{Parameter, Recording, Thetas, Tick};
 
+/// A named quantity, one value a row.
+pub type Covariate = (&'static str, Vec<f64>);
+
 /// What makes a plant's clock tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Clock {
@@ -95,8 +98,24 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     fn parameters(&self) -> Vec<Parameter>;
     /// Typical sizes of what drives it and what is seen of it in `recordings`, by which fits choose where to begin.
     fn typical(&self, recordings: &[Recording<Self::Stimulus>]) -> Typical;
-    /// The parameters of its initial state in `recording`, with values estimated from the first rows.
-    fn initial_parameters(&self, recording: &Recording<Self::Stimulus>) -> Vec<Parameter>;
+    /// The parameters of its state in row `row` of `recording`, with values estimated from the rows around it.
+    fn initial_parameters(&self, recording: &Recording<Self::Stimulus>, row: usize) -> Vec<Parameter>;
+    /// Standard deviation of the rounding of a measured channel, in its unit; 0 where none is known.
+    fn resolution(&self, _recording: &Recording<Self::Stimulus>, _channel: &str) -> f64 {
+        0.0
+    }
+    /// What a residual may depend on when something is missing, row by row.
+    fn covariates(&self, _recording: &Recording<Self::Stimulus>) -> Vec<Covariate> {
+        Vec::new()
+    }
+    /// What was left out or is peculiar about `recording`, in words a report can show.
+    fn notes(&self, _recording: &Recording<Self::Stimulus>) -> Vec<String> {
+        Vec::new()
+    }
+    /// The unit a parameter has here, where mechanisms declare one in general terms.
+    fn unit(&self, declared: &str) -> String {
+        declared.to_owned()
+    }
     /// The running part, one lane a point of `thetas` (in the order of [`Plant::parameters`]).
     fn dynamics(&self, thetas: &Thetas) -> Self::Dynamics;
 }
@@ -129,7 +148,7 @@ pub struct Typical {
     pub output: f64,
     /// Of the first channel's rate of change [its unit/s].
     pub rate: f64,
-    /// The delay the recordings' own stamps show [s], where they show one.
+    /// The delay of commands that the recordings' own time stamps show [s], where they show it.
     pub delay: Option<f64>,
 }
 

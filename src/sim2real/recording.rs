@@ -74,9 +74,11 @@ impl<S> Recording<S> {
 /// The rows of a recording that count: a fit sees these and no others.
 #[derive(Debug)]
 pub struct Part<'a, S> {
-    /// The whole recording; a run follows it from its first row.
+    /// The whole recording.
     pub recording: &'a Recording<S>,
-    /// The rows whose residuals count.
+    /// The row a run starts from, with an initial state of its own.
+    pub start: usize,
+    /// The rows whose residuals count, none before `start`.
     pub rows: Range<usize>,
 }
 
@@ -84,20 +86,40 @@ impl<'a, S> Part<'a, S> {
     /// All rows of `recording`.
     #[must_use]
     pub fn whole(recording: &'a Recording<S>) -> Self {
-        Self { recording, rows: 0..recording.len() }
+        Self { recording, start: 0, rows: 0..recording.len() }
     }
 
-    /// The rows before `fraction` of the time has passed, and those after.
+    /// The rows a run has to follow: from `start` to the last row that counts.
+    #[must_use]
+    pub fn followed(&self) -> Range<usize> {
+        self.start..self.rows.end
+    }
+
+    /// Consecutive windows of at least `seconds` [s], each started afresh, that together cover the rows that count.
+    #[must_use]
+    pub fn windows(&self, seconds: f64) -> Vec<Self> {
+        let time = &self.recording.time[self.rows.clone()];
+        let span = time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0);
+        let count = ((span / seconds).floor() as usize).max(1);
+        let cut = |k: usize| match k {
+            0 => self.rows.start,
+            k if k == count => self.rows.end,
+            k => self.rows.start + time.partition_point(|t| *t < time[0] + span * k as f64 / count as f64),
+        };
+        (0..count).map(|k| Self { recording: self.recording, start: cut(k), rows: cut(k)..cut(k + 1) }).collect()
+    }
+
+    /// The rows before `fraction` of the time has passed, and those after, which a run reaches through the first.
     #[must_use]
     pub fn split(recording: &'a Recording<S>, fraction: f64) -> (Self, Self) {
         let cut = recording.row_at_fraction(fraction);
-        (Self { recording, rows: 0..cut }, Self { recording, rows: cut..recording.len() })
+        (Self { recording, start: 0, rows: 0..cut }, Self { recording, start: 0, rows: cut..recording.len() })
     }
 }
 
 impl<S> Clone for Part<'_, S> {
     fn clone(&self) -> Self {
-        Self { recording: self.recording, rows: self.rows.clone() }
+        Self { recording: self.recording, start: self.start, rows: self.rows.clone() }
     }
 }
 
@@ -119,8 +141,18 @@ mod tests {
     fn a_split_is_in_time_not_in_rows() {
         let recording = recording();
         let (fit, held) = Part::split(&recording, 0.7);
-        assert_eq!((fit.rows, held.rows), (0..3, 3..4));
+        assert_eq!((fit.rows.clone(), held.rows.clone()), (0..3, 3..4));
         assert_eq!(Part::whole(&recording).rows, 0..4);
+        assert_eq!(held.followed(), 0..4);
+    }
+
+    #[test]
+    fn windows_cover_each_row_once() {
+        let recording = recording();
+        let windows = Part::whole(&recording).windows(3.0);
+        assert_eq!(windows.iter().map(|w| w.rows.len()).sum::<usize>(), 4);
+        assert!(windows.iter().all(|w| w.start == w.rows.start));
+        assert_eq!(Part::whole(&recording).windows(100.0).len(), 1);
     }
 
     #[test]

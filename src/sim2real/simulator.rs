@@ -1,6 +1,8 @@
 //! All that identification, diagnosis and reports see of a simulator.
 
-use super::{About, Channel, Form, Parameter, Recording, Seed, Thetas, Trajectory};
+use std::ops::Range;
+
+use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, Thetas, Trajectory};
 
 /// Something that follows a recording and says what it would have measured.
 ///
@@ -9,7 +11,7 @@ use super::{About, Channel, Form, Parameter, Recording, Seed, Thetas, Trajectory
 ///
 /// # Contract
 /// [`Simulator::rollout`] gives one trajectory a lane, each with every channel of [`Simulator::channels`] and one
-/// sample a row; a lane's bits depend on neither the lanes beside it nor the thread.
+/// sample for each row followed; a lane's bits depend on neither the lanes beside it nor the thread.
 pub trait Simulator: Send + Sync {
     /// What drives it.
     type Stimulus: Send + Sync;
@@ -19,11 +21,28 @@ pub trait Simulator: Send + Sync {
     fn channels(&self) -> &[Channel];
     /// Its parameters: the plant's, then those of each mechanism in turn.
     fn parameters(&self) -> &[Parameter];
-    /// Parameters of the initial state in `recording`: they belong to the recording and are fitted beside it.
-    fn initial_parameters(&self, recording: &Recording<Self::Stimulus>) -> Vec<Parameter>;
-    /// Follows the first `rows` rows of `recording` over all lanes of `thetas`: [`Simulator::parameters`] first, then
-    /// [`Simulator::initial_parameters`].
-    fn rollout(&self, thetas: &Thetas, recording: &Recording<Self::Stimulus>, rows: usize, seed: Seed) -> Vec<Trajectory>;
+    /// What makes its clock tick.
+    fn clock(&self) -> Clock;
+    /// Parameters of the state in row `row` of `recording`: they belong to the recording and are estimated beside the
+    /// simulator's own.
+    fn initial_parameters(&self, recording: &Recording<Self::Stimulus>, row: usize) -> Vec<Parameter>;
+    /// Standard deviation of the rounding of a measured channel, in its unit; 0 where none is known.
+    fn resolution(&self, recording: &Recording<Self::Stimulus>, channel: &str) -> f64;
+    /// What a residual may depend on when something is missing, row by row: the remainder is tested against each.
+    fn covariates(&self, recording: &Recording<Self::Stimulus>) -> Vec<Covariate>;
+    /// What was left out or is peculiar about `recording`, in words a report can show.
+    fn notes(&self, recording: &Recording<Self::Stimulus>) -> Vec<String>;
+    /// The unit a parameter has here, where mechanisms declare one in general terms.
+    fn unit(&self, declared: &str) -> String;
+    /// Follows `rows` of `recording` over all lanes of `thetas`: [`Simulator::parameters`] first, then
+    /// [`Simulator::initial_parameters`] of the first of these rows.
+    fn rollout(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<Self::Stimulus>,
+        rows: Range<usize>,
+        seed: Seed,
+    ) -> Vec<Trajectory>;
 }
 
 /// A mechanism a twin could be given: what diagnosis needs to know of it.

@@ -1,8 +1,175 @@
 //! Locate, name, model, prove: what a simulator left out, found from recordings.
+//!
+//! One file a step, in this order: [`evidence`] divides the recordings and finds their [`noise`]; a [`hypothesis`] is the
+//! twin with mechanisms added, and the first of them, with none, its own parameters refitted; [`screen`] ranks mechanisms
+//! by their signatures; [`select`] fits and compares sets of them, by the evidence that [`whiteness`] counts; [`rivals`]
+//! looks for other names; [`structure`] asks what is left; [`prove`] measures errors on what was held out; [`locate`]
+//! says where; [`verdict`] puts it into words.
 
 mod diagnosis;
+mod evidence;
+mod hypothesis;
+mod locate;
+mod noise;
+mod prove;
+mod rivals;
+mod screen;
+mod select;
+mod structure;
+mod verdict;
+mod whiteness;
 
 pub use diagnosis::{
     ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Score,
     Verdict, Where,
 };
+pub use evidence::{Evidence, HELD_OUT};
+pub use hypothesis::Hypothesis;
+pub use noise::channel_weights;
+
+use hypothesis::Inquiry;
+use prove::Contest;
+
+use super::identify::Fit;
+use super::{Clock, Recording, Seed, Twin};
+
+/// Told of each step: what is done, and how many steps of how many lie behind it.
+pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+
+/// One channel of one recording beside what the three twins say of it, row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// The recording.
+    pub recording: String,
+    /// Whether no fit saw these rows.
+    pub held_out: bool,
+    /// What makes the clock tick.
+    pub clock: Clock,
+    /// The channel.
+    pub channel: String,
+    /// Its unit.
+    pub unit: String,
+    /// Time of each row [s].
+    pub time: Vec<f64>,
+    /// What was measured; none where the sample was lost.
+    pub measured: Vec<Option<f64>>,
+    /// The twin as given.
+    pub nominal: Vec<f64>,
+    /// The twin with its own parameters refitted.
+    pub recalibrated: Vec<f64>,
+    /// The twin with what was found added.
+    pub trued: Vec<f64>,
+}
+
+/// A diagnosis, the twin it leads to, and what to plot.
+#[derive(Debug, Clone)]
+pub struct Outcome<T> {
+    /// What was found.
+    pub diagnosis: Diagnosis,
+    /// The twin with what was found added.
+    pub trued: T,
+    /// Values of the trued twin's parameters, in their order.
+    pub values: Vec<f64>,
+    /// Their standard deviations.
+    pub std: Vec<f64>,
+    /// Measurements beside the three twins.
+    pub comparisons: Vec<Comparison>,
+}
+
+/// A twin refitted, with nothing added.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    /// Values of its parameters, in their order.
+    pub values: Vec<f64>,
+    /// Their standard deviations.
+    pub std: Vec<f64>,
+    /// Names of the parameters that ended at a bound.
+    pub at_bound: Vec<String>,
+    /// Errors on held-out data; the trued twin is the recalibrated one.
+    pub fit: Vec<ChannelFit>,
+    /// How the held-out data were chosen, in words.
+    pub held_out: String,
+    /// Measurements beside the twin as given and refitted.
+    pub comparisons: Vec<Comparison>,
+}
+
+/// Finds what `twin` leaves out, from `recordings`; `held_out` are for proof alone, and where there are none, the last
+/// [`HELD_OUT`] of each recording is.
+#[must_use]
+pub fn diagnose<T: Twin>(
+    twin: &T,
+    recordings: &[Recording<T::Stimulus>],
+    held_out: &[Recording<T::Stimulus>],
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Outcome<T> {
+    progress("dividing the recordings", 0, 1);
+    let evidence = Evidence::divide(twin, recordings, held_out);
+    let candidates = twin.candidates(recordings);
+    let inquiry = Inquiry { twin, candidates: &candidates, evidence: &evidence, seed };
+    let selection = select::select(&inquiry, progress);
+    progress("looking for rivals", 0, 1);
+    let rivals = rivals::rivals(&inquiry, &selection);
+    progress("proving on held-out data", 0, 1);
+    let recalibrated = inquiry.in_free_run(&selection.recalibrated);
+    let trued = inquiry.in_free_run(&selection.selected);
+    let given: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).collect();
+    let contest = Contest {
+        nominal: (twin, &given),
+        recalibrated: (twin, &recalibrated.values),
+        trued: (&selection.selected.twin, &trued.values),
+    };
+    let comparisons = prove::compared(&contest, &evidence, seed);
+    let findings = verdict::Findings {
+        fits: prove::channel_fits(&comparisons, &evidence.weights, seed),
+        placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
+        remainder: verdict::remainder(&inquiry, &selection),
+        dependence: verdict::dependence(&inquiry, &selection.selected),
+        foretold: verdict::foretold(&inquiry, &selection.selected),
+        intervals: locate::intervals(&comparisons),
+        std: inflated(&inquiry, &selection.selected, &trued),
+        trued: trued.clone(),
+    };
+    let diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
+    Outcome { diagnosis, trued: selection.selected.twin, values: trued.values, std: findings.std, comparisons }
+}
+
+/// Refits the parameters that `twin` has, and adds nothing.
+#[must_use]
+pub fn calibrate<T: Twin>(
+    twin: &T,
+    recordings: &[Recording<T::Stimulus>],
+    held_out: &[Recording<T::Stimulus>],
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Calibration {
+    progress("fitting", 0, 1);
+    let evidence = Evidence::divide(twin, recordings, held_out);
+    let inquiry = Inquiry { twin, candidates: &[], evidence: &evidence, seed };
+    let hypothesis = inquiry.recalibrated();
+    let fit = inquiry.in_free_run(&hypothesis);
+    let given: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).collect();
+    let contest = Contest { nominal: (twin, &given), recalibrated: (twin, &fit.values), trued: (twin, &fit.values) };
+    let comparisons = prove::compared(&contest, &evidence, seed);
+    Calibration {
+        std: inflated(&inquiry, &hypothesis, &fit),
+        at_bound: fit.at_bound,
+        values: fit.values,
+        fit: prove::channel_fits(&comparisons, &evidence.weights, seed),
+        held_out: evidence.how.clone(),
+        comparisons,
+    }
+}
+
+/// Standard deviations as the residuals make them, rather than white noise of the noise floor's size: misfit and
+/// autocorrelation both widen them.
+fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, fit: &Fit) -> Vec<f64> {
+    let parts = if inquiry.evidence.window.is_some() { &inquiry.evidence.free_run } else { &inquiry.evidence.compared };
+    let blocks = inquiry.problem(&hypothesis.twin, parts).blocks();
+    let factor = whiteness::channel_misfits(fit.residual.as_slice(), &blocks)
+        .iter()
+        .map(|m| (m.sum_of_squares / m.count.max(1) as f64).max(1.0) * m.autocorrelation_time.max(1.0))
+        .fold(1.0, f64::max)
+        .sqrt();
+    fit.std.iter().map(|std| std * factor).collect()
+}

@@ -1,0 +1,20 @@
+//! Reports: self-contained HTML pages that open without a network, and are the same bytes for the same input.
+//!
+//! A page is a [`Page`] of [`Section`]s; each section is one struct in `sections/x.rs` beside its template
+//! `templates/x.html`. Only `plot` knows the plotting library.
+
+mod backtest;
+mod decimate;
+mod diagnosis;
+mod figures;
+mod page;
+mod plot;
+mod quantity;
+mod section;
+mod sections;
+
+pub use backtest::{BacktestPage, Cost, Exposure, Fill, InForce, Input, Metric};
+pub use diagnosis::diagnosis_page;
+pub use figures::{Abscissa, DiagnosisFigures, Trace};
+pub use page::{Badge, Page, Tone};
+pub use section::{ReportError, Section};

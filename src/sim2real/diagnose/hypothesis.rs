@@ -1,0 +1,139 @@
+//! A hypothesis: the twin with some mechanisms added, fitted as well as it goes.
+
+use rayon::prelude::*;
+
+use super::evidence::Evidence;
+use super::screen::{Screened, signatures};
+use super::whiteness::{ChannelMisfit, channel_misfits};
+use crate::sim2real::identify::{Block, Fit, Problem, State, fit};
+use crate::sim2real::{Candidate, Part, Seed, Twin};
+
+/// The twin with the mechanisms numbered in `added`, and its fit.
+#[derive(Debug, Clone)]
+pub struct Hypothesis<T> {
+    /// The twin with the mechanisms.
+    pub twin: T,
+    /// Numbers of the candidates added, in the order in which their parameters stand.
+    pub added: Vec<usize>,
+    /// The fit to what hypotheses are compared on.
+    pub fit: Fit,
+    /// What is left, channel by channel.
+    pub(super) misfits: Vec<ChannelMisfit>,
+}
+
+impl<T> Hypothesis<T> {
+    /// The mechanisms added, in the order of their numbers: the same for the same set.
+    pub(super) fn set(&self) -> Vec<usize> {
+        let mut set = self.added.clone();
+        set.sort_unstable();
+        set
+    }
+
+    /// Number of free parameters.
+    pub(super) fn free(&self) -> usize {
+        self.fit.free.len()
+    }
+}
+
+/// What all hypotheses share: the twin as given, what may be added to it, and the evidence.
+pub(super) struct Inquiry<'a, T: Twin> {
+    pub twin: &'a T,
+    pub candidates: &'a [Candidate],
+    pub evidence: &'a Evidence<'a, T::Stimulus>,
+    pub seed: Seed,
+}
+
+/// How many of a candidate's starts are followed to their end.
+const STARTS: usize = 2;
+
+impl<T: Twin> Inquiry<'_, T> {
+    /// The twin as given, its own parameters refitted.
+    pub fn recalibrated(&self) -> Hypothesis<T> {
+        let start: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
+        self.fitted(self.twin.clone(), Vec::new(), &[start], None)
+    }
+
+    /// `parent` with candidate `number` added, fitted from the starts that screening liked best.
+    pub fn extended(&self, parent: &Hypothesis<T>, number: usize, screened: &Screened) -> Hypothesis<T> {
+        let twin = parent.twin.with(&self.candidates[number]);
+        let starts: Vec<Vec<f64>> =
+            screened.starts.iter().take(STARTS).map(|s| parent.fit.values.iter().chain(s).copied().collect()).collect();
+        let added = parent.added.iter().copied().chain([number]).collect();
+        self.fitted(twin, added, &starts, Some(&parent.fit.state))
+    }
+
+    /// `whole` without the `position`-th of its mechanisms, refitted from the joint solution and from the twin as given.
+    pub fn without(&self, whole: &Hypothesis<T>, position: usize) -> Hypothesis<T> {
+        let added: Vec<usize> =
+            whole.added.iter().enumerate().filter(|(i, _)| *i != position).map(|(_, number)| *number).collect();
+        let own = self.twin.parameters().len();
+        let mut twin = self.twin.clone();
+        let mut joint = whole.fit.values[..own].to_vec();
+        let mut given: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
+        let mut at = own;
+        for (i, number) in whole.added.iter().enumerate() {
+            let count = self.candidates[*number].form.parameters.len();
+            if i != position {
+                twin = twin.with(&self.candidates[*number]);
+                joint.extend_from_slice(&whole.fit.values[at..at + count]);
+                given.extend_from_slice(&whole.fit.values[at..at + count]);
+            }
+            at += count;
+        }
+        self.fitted(twin, added, &[joint, given], Some(&whole.fit.state))
+    }
+
+    /// The best fit of `twin` from several starts.
+    fn fitted(&self, twin: T, added: Vec<usize>, starts: &[Vec<f64>], state: Option<&State>) -> Hypothesis<T> {
+        let problem = self.problem(&twin, &self.evidence.compared);
+        let estimated = self.evidence.initial_state(&problem);
+        let state = state.unwrap_or(&estimated);
+        let free = free_parameters(&twin);
+        let fits: Vec<Fit> = starts.par_iter().map(|start| fit(&problem, start, &free, state)).collect();
+        let blocks = problem.blocks();
+        let Some(best) = fits.into_iter().min_by(|a, b| measured(a, &blocks).total_cmp(&measured(b, &blocks))) else {
+            let fit = fit(&problem, &nominal(&twin), &free, state);
+            return self.weighed(twin, added, fit, &blocks);
+        };
+        self.weighed(twin, added, best, &blocks)
+    }
+
+    fn weighed(&self, twin: T, added: Vec<usize>, fit: Fit, blocks: &[Block]) -> Hypothesis<T> {
+        let misfits = channel_misfits(fit.residual.as_slice(), blocks);
+        Hypothesis { twin, added, fit, misfits }
+    }
+
+    /// `hypothesis` fitted to the same rows in free run.
+    pub fn in_free_run(&self, hypothesis: &Hypothesis<T>) -> Fit {
+        if self.evidence.window.is_none() {
+            return hypothesis.fit.clone();
+        }
+        let problem = self.problem(&hypothesis.twin, &self.evidence.free_run);
+        fit(&problem, &hypothesis.fit.values, &hypothesis.fit.free, &State::estimated(&problem))
+    }
+
+    /// The problem of fitting `twin` to `parts`.
+    pub fn problem<'b>(&'b self, twin: &'b T, parts: &'b [Part<'b, T::Stimulus>]) -> Problem<'b, T> {
+        Problem { simulator: twin, parts, weights: &self.evidence.weights, seed: self.seed }
+    }
+
+    /// How each candidate that `parent` does not have yet would do, by its signature.
+    pub fn screened(&self, parent: &Hypothesis<T>) -> Vec<Screened> {
+        signatures(self, parent)
+    }
+}
+
+/// Numbers of the parameters a fit may move.
+pub(super) fn free_parameters<T: Twin>(twin: &T) -> Vec<usize> {
+    twin.parameters().iter().enumerate().filter(|(_, p)| !p.frozen()).map(|(k, _)| k).collect()
+}
+
+fn nominal<T: Twin>(twin: &T) -> Vec<f64> {
+    twin.parameters().iter().map(|p| p.nominal).collect()
+}
+
+/// Sum of squares of the measured residuals alone.
+fn measured(fit: &Fit, blocks: &[Block]) -> f64 {
+    let rows = blocks.last().map_or(0, |b| b.range.end);
+    fit.residual.rows(0, rows).norm_squared()
+}

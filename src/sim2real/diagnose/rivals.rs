@@ -1,0 +1,66 @@
+//! Rivals: other mechanisms in the place of each that was selected.
+
+use rayon::prelude::*;
+
+use super::hypothesis::Inquiry;
+use super::select::{Selection, gain};
+use crate::sim2real::Twin;
+
+/// Rivals that lose by more than this are none.
+pub(super) const WITHIN: f64 = 10.0;
+/// Other mechanisms fitted in the place of one.
+const TRIED: usize = 4;
+
+/// The rivals of one selected mechanism.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Place {
+    /// What is lost by leaving the mechanism out.
+    pub gain: f64,
+    /// Other mechanisms in its place: number of the candidate, and by how much it loses (negative: wins).
+    pub others: Vec<(usize, f64)>,
+}
+
+/// The rivals of each selected mechanism, in their order.
+pub(super) fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Place> {
+    let selected = &selection.selected;
+    selected
+        .added
+        .iter()
+        .zip(&selection.without)
+        .map(|(own, less)| {
+            let name = inquiry.candidates[*own].about.name;
+            let whole = gain(inquiry, less, selected);
+            let mut screened = inquiry.screened(less);
+            screened.retain(|s| s.score > 0.0 && inquiry.candidates[s.number].about.name != name);
+            screened.sort_by(|a, b| b.score.total_cmp(&a.score));
+            screened.truncate(TRIED);
+            let others: Vec<(usize, f64)> = screened
+                .par_iter()
+                .map(|s| (s.number, whole - gain(inquiry, less, &inquiry.extended(less, s.number, s))))
+                .collect();
+            Place { gain: whole, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
+        })
+        .collect()
+}
+
+/// Probabilities of the selected mechanism and of each rival, from what they lose: the gain is twice the logarithm of a
+/// likelihood ratio. That nothing is missing in its place takes part too.
+pub(super) fn confidences(place: &Place) -> (f64, Vec<f64>) {
+    let weight = |loss: f64| (-0.5 * loss.clamp(-60.0, 600.0)).exp();
+    let others: Vec<f64> = place.others.iter().map(|(_, loss)| weight(*loss)).collect();
+    let total = 1.0 + weight(place.gain) + others.iter().sum::<f64>();
+    (1.0 / total, others.into_iter().map(|w| w / total).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_rivals_share_and_distant_ones_do_not_count() {
+        let (own, others) = confidences(&Place { gain: 100.0, others: vec![(1, 0.0)] });
+        assert!((own - 0.5).abs() < 1e-9 && (others[0] - 0.5).abs() < 1e-9);
+        let (own, _) = confidences(&Place { gain: 100.0, others: vec![(1, 9.0)] });
+        assert!(own > 0.98);
+    }
+}

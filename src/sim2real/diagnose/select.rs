@@ -1,0 +1,167 @@
+//! Selection: which set of mechanisms the evidence asks for, and no more.
+
+use rayon::prelude::*;
+
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::screen::Screened;
+use super::{Progress, Score};
+use crate::sim2real::Twin;
+
+/// A mechanism must gain more than this to be added.
+pub(super) const ACCEPT: f64 = 10.0;
+/// A further mechanism must explain at least this part of the first misfit.
+const SHARE: f64 = 0.03;
+/// A mechanism must move at least this many rows by more than the noise.
+const INFORMATIVE_ROWS: usize = 25;
+/// Most mechanisms in a set.
+const STAGES: usize = 3;
+/// Hypotheses that each stage hands to the next: the best alone may be the wrong one to build on.
+const BEAM: usize = 3;
+/// Candidates fitted from each hypothesis of the beam.
+const FITTED: usize = 6;
+/// Candidates whose signature looks less than this like the misfit are not fitted.
+const SCREENED_OUT: f64 = 0.01;
+
+/// The outcome of a selection.
+pub(super) struct Selection<T> {
+    /// The twin as given, refitted.
+    pub recalibrated: Hypothesis<T>,
+    /// The set that was selected; the same as `recalibrated` where nothing was.
+    pub selected: Hypothesis<T>,
+    /// `selected` with one mechanism left out, in the order of its mechanisms.
+    pub without: Vec<Hypothesis<T>>,
+    /// Every mechanism tried in every stage.
+    pub scores: Vec<Score>,
+}
+
+/// Selects stage by stage, then leaves out again what the whole does not need.
+pub(super) fn select<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> Selection<T> {
+    let recalibrated = inquiry.recalibrated();
+    let mut scores = Vec::new();
+    let mut beam = vec![recalibrated.clone()];
+    let mut best_of_stage: Vec<Hypothesis<T>> = Vec::new();
+    for stage in 0..STAGES {
+        progress("comparing mechanisms", stage, STAGES);
+        let (children, tried) = expand(inquiry, &beam, stage);
+        scores.extend(tried);
+        let Some(best) = children.first().cloned() else { break };
+        let parent = best_of_stage.last().unwrap_or(&recalibrated);
+        let promising = gain(inquiry, parent, &best) > 0.5 * ACCEPT;
+        best_of_stage.push(best);
+        if !promising {
+            break;
+        }
+        beam = children.into_iter().take(BEAM).collect();
+    }
+    let (selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
+    for score in &mut scores {
+        let place = selected.added.iter().position(|n| inquiry.candidates[*n].about.name == score.mechanism);
+        score.accepted = place == Some(score.stage);
+    }
+    Selection { recalibrated, selected, without, scores }
+}
+
+/// All sets one larger than those of the beam, best first, and how each mechanism did beside the best of the beam.
+fn expand<T: Twin>(inquiry: &Inquiry<'_, T>, beam: &[Hypothesis<T>], stage: usize) -> (Vec<Hypothesis<T>>, Vec<Score>) {
+    let mut jobs: Vec<(usize, Screened, bool)> = Vec::new();
+    let mut sets: Vec<Vec<usize>> = Vec::new();
+    for (place, parent) in beam.iter().enumerate() {
+        let mut screened = inquiry.screened(parent);
+        screened.sort_by(|a, b| b.score.total_cmp(&a.score));
+        for (rank, one) in screened.into_iter().enumerate() {
+            let mut set: Vec<usize> = parent.set();
+            set.push(one.number);
+            set.sort_unstable();
+            let fitted = rank < FITTED && one.score > SCREENED_OUT && !sets.contains(&set);
+            if fitted {
+                sets.push(set);
+            }
+            jobs.push((place, one, fitted));
+        }
+    }
+    let fitted: Vec<Option<Hypothesis<T>>> = jobs
+        .par_iter()
+        .map(|(place, screened, fitted)| fitted.then(|| inquiry.extended(&beam[*place], screened.number, screened)))
+        .collect();
+    let scores = jobs
+        .iter()
+        .zip(&fitted)
+        .filter(|((place, _, _), _)| *place == 0)
+        .map(|((_, screened, _), child)| {
+            let candidate = &inquiry.candidates[screened.number];
+            Score {
+                mechanism: candidate.about.name.to_owned(),
+                form: candidate.form.name.to_owned(),
+                stage,
+                screen: screened.score.max(0.0),
+                survival: screened.survival,
+                gain: child.as_ref().map(|child| gain(inquiry, &beam[0], child)),
+                accepted: false,
+            }
+        })
+        .collect();
+    let mut children: Vec<Hypothesis<T>> = fitted.into_iter().flatten().collect();
+    // Compared with one another through what they share: the best of the beam they come from.
+    let reference = &beam[0];
+    let mut ranked: Vec<(f64, Hypothesis<T>)> =
+        children.drain(..).map(|child| (gain(inquiry, reference, &child), child)).collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    (ranked.into_iter().map(|(_, child)| child).collect(), scores)
+}
+
+/// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time.
+fn pruned<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    recalibrated: &Hypothesis<T>,
+    mut best_of_stage: Vec<Hypothesis<T>>,
+) -> (Hypothesis<T>, Vec<Hypothesis<T>>) {
+    let Some(mut whole) = best_of_stage.pop() else { return (recalibrated.clone(), Vec::new()) };
+    loop {
+        if whole.added.is_empty() {
+            return (recalibrated.clone(), Vec::new());
+        }
+        let without: Vec<Hypothesis<T>> = (0..whole.added.len())
+            .into_par_iter()
+            .map(|i| if whole.added.len() == 1 { recalibrated.clone() } else { inquiry.without(&whole, i) })
+            .collect();
+        let weakest = (0..whole.added.len())
+            .map(|i| (i, gain(inquiry, &without[i], &whole), needed(inquiry, recalibrated, &without[i], &whole)))
+            .filter(|(_, gain, needed)| *gain <= ACCEPT || !needed)
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((weakest, _, _)) = weakest else { return (whole, without) };
+        let smaller = without[weakest].clone();
+        // Another set of that size, found on the way up, may have been the better one to keep.
+        whole = match best_of_stage.pop() {
+            Some(other) if gain(inquiry, recalibrated, &other) > gain(inquiry, recalibrated, &smaller) => other,
+            _ => smaller,
+        };
+    }
+}
+
+/// Whether `whole` explains enough more than `less`, in enough rows.
+fn needed<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, less: &Hypothesis<T>, whole: &Hypothesis<T>) -> bool {
+    let shares = first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).map(|((first, less), whole)| {
+        let above_noise = (first.sum_of_squares - first.count as f64).max(0.1 * first.sum_of_squares);
+        (less.sum_of_squares - whole.sum_of_squares) / above_noise
+    });
+    let enough = whole.added.len() == 1 || shares.fold(0.0, f64::max) >= SHARE;
+    let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
+    let moved = (0..rows).filter(|i| (less.fit.residual[*i] - whole.fit.residual[*i]).abs() > 1.0).count();
+    // Effects below the noise show in the sum of many rows only: there, the gain alone decides.
+    let weak = moved == 0 && rows > 40 * INFORMATIVE_ROWS;
+    enough && (weak || moved >= INFORMATIVE_ROWS)
+}
+
+/// `sum N_e ln(RSS0 / RSS1) - dk ln N_e`, with the effective number of residuals of the *alternative*: autocorrelated
+/// noise then does not look like evidence.
+pub(super) fn gain<T: Twin>(inquiry: &Inquiry<'_, T>, null: &Hypothesis<T>, alternative: &Hypothesis<T>) -> f64 {
+    let mut gain = 0.0;
+    let mut effective = 1.0;
+    for (null, other) in null.misfits.iter().zip(&alternative.misfits) {
+        let place = inquiry.evidence.weights.iter().position(|w| w.channel == other.channel);
+        let rounding = place.map_or(0.0, |k| inquiry.evidence.rounding[k]).max(1e-9) * other.count as f64;
+        gain += other.effective() * ((null.sum_of_squares + rounding) / (other.sum_of_squares + rounding)).ln();
+        effective += other.effective();
+    }
+    gain - (alternative.free() as f64 - null.free() as f64) * effective.ln()
+}

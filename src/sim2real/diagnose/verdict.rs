@@ -1,0 +1,320 @@
+//! The verdict, and the words for it.
+
+use std::collections::BTreeMap;
+
+use super::diagnosis::{
+    ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Verdict,
+    Where,
+};
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::rivals::{Place, confidences};
+use super::select::Selection;
+use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
+use super::whiteness;
+use crate::sim2real::identify::Fit;
+use crate::sim2real::{Clock, Covariate, Part, Twin};
+
+/// A remainder above this part of the first misfit is more than an error of form.
+const FORM_ERROR: f64 = 0.10;
+/// A residual counts as structured where a covariate's F test is this strong (-log10 p): complete models reach 5.
+const DEPENDENT: f64 = 8.0;
+/// A residual counts as structured where a regression foretells this part of it on held-out data.
+const FORETOLD: f64 = 0.10;
+/// A twin whose mean squared residual is at most this many times the noise needs nothing.
+const AT_THE_NOISE: f64 = 1.5;
+/// A name less certain than this is ambiguous.
+const CERTAIN: f64 = 0.7;
+
+/// Everything a verdict rests on.
+pub(super) struct Findings {
+    pub fits: Vec<ChannelFit>,
+    pub placebo_p: Option<f64>,
+    pub remainder: f64,
+    pub dependence: Option<Dependence>,
+    pub foretold: f64,
+    pub intervals: Vec<Interval>,
+    pub std: Vec<f64>,
+    pub trued: Fit,
+}
+
+/// The part of the recalibrated misfit above the noise that is left: of the channel in which most is left.
+///
+/// Where rows are messages the misfit is taken about its mean: a constant cost is something that any simulator can be
+/// given, and no measure of what was explained.
+pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> f64 {
+    let blocks = inquiry.problem(inquiry.twin, &inquiry.evidence.compared).blocks();
+    let about_mean = inquiry.twin.clock() == Clock::Event;
+    selection
+        .recalibrated
+        .misfits
+        .iter()
+        .zip(&selection.selected.misfits)
+        .filter_map(|(first, last)| {
+            let count = first.count as f64;
+            let residual = selection.recalibrated.fit.residual.as_slice();
+            let sum: f64 = whiteness::of_channel(residual, &blocks, &first.channel).iter().flat_map(|s| s.iter()).sum();
+            let constant = if about_mean { sum * sum / count.max(1.0) } else { 0.0 };
+            let misfit = first.sum_of_squares - constant - count;
+            (misfit > (AT_THE_NOISE - 1.0) * count).then(|| ((last.sum_of_squares - count) / misfit).max(0.0))
+        })
+        .fold(0.0, f64::max)
+}
+
+/// What the remaining residuals of messages depend on most.
+pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
+    if inquiry.twin.clock() != Clock::Event {
+        return None;
+    }
+    let parts = &inquiry.evidence.compared;
+    let residual = selected.fit.residual.as_slice();
+    inquiry
+        .problem(&selected.twin, parts)
+        .blocks()
+        .iter()
+        .filter_map(|block| {
+            let covariates = inquiry.twin.covariates(parts[block.part].recording);
+            strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates)
+        })
+        .max_by(|a, b| a.strength.total_cmp(&b.strength))
+}
+
+/// The part of what is left of sampled signals that the motion foretells on held-out data.
+pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> f64 {
+    if inquiry.twin.clock() == Clock::Event {
+        return 0.0;
+    }
+    let held_out: Vec<Part<'_, T::Stimulus>> = match inquiry.evidence.window {
+        Some(seconds) => inquiry.evidence.held_out.iter().flat_map(|p| p.windows(seconds)).collect(),
+        None => inquiry.evidence.held_out.clone(),
+    };
+    let left = |parts: &[Part<'_, T::Stimulus>]| -> Vec<Left> {
+        let problem = inquiry.problem(&selected.twin, parts);
+        let residual = problem.evaluate(&selected.fit.values, &inquiry.evidence.initial_state(&problem), &[]).residual;
+        let blocks = problem.blocks();
+        let first = blocks.first().map(|b| b.channel.clone());
+        let of_first = blocks.into_iter().filter(|b| Some(&b.channel) == first.as_ref());
+        of_first
+            .map(|b| Left {
+                recording: parts[b.part].recording.name.clone(),
+                residual: residual.as_slice()[b.range].to_vec(),
+                rows: b.rows,
+            })
+            .collect()
+    };
+    let mut covariates: BTreeMap<String, Vec<Covariate>> = BTreeMap::new();
+    for part in inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out) {
+        covariates.entry(part.recording.name.clone()).or_insert_with(|| inquiry.twin.covariates(part.recording));
+    }
+    regression(&left(&inquiry.evidence.compared), &left(&held_out), &covariates)
+}
+
+/// The whole result.
+pub(super) fn diagnosis<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    selection: &Selection<T>,
+    places: &[Place],
+    findings: &Findings,
+) -> Diagnosis {
+    let selected = &selection.selected;
+    let mut effects = effects(inquiry, selected, places, findings);
+    let verdict = decide(selection, &effects, findings);
+    if verdict == Verdict::Unexplained {
+        effects.iter_mut().for_each(|e| e.confidence *= 1.0 - findings.remainder.clamp(0.0, 1.0));
+    }
+    let blocks = inquiry.problem(&selected.twin, &inquiry.evidence.compared).blocks();
+    let mut names: Vec<&str> = inquiry.candidates.iter().map(|c| c.about.name).collect();
+    names.dedup();
+    Diagnosis {
+        schema: SCHEMA.to_owned(),
+        verdict,
+        summary: summary(inquiry, verdict, &effects, findings),
+        location: Where { intervals: findings.intervals.clone(), onset: None },
+        parameters: parameters(inquiry, selected, findings),
+        fit: findings.fits.clone(),
+        checks: Checks {
+            adequacy: whiteness::adequacy(selected.fit.residual.as_slice(), &blocks),
+            remainder: findings.remainder,
+            placebo_p: findings.placebo_p,
+            at_bound: findings.trued.at_bound.clone(),
+            tried: names.len(),
+            notes: notes(inquiry, findings),
+        },
+        next_experiment: next_experiment(verdict, &effects),
+        scores: selection.scores.clone(),
+        modelled: inquiry.twin.modelled().into_iter().map(str::to_owned).collect(),
+        held_out: inquiry.evidence.how.clone(),
+        effects,
+    }
+}
+
+fn structured(findings: &Findings) -> bool {
+    findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
+}
+
+fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
+    let at_the_noise = selection.selected.misfits.iter().all(|m| m.sum_of_squares <= AT_THE_NOISE * m.count as f64);
+    let left_over = structured(findings) && !at_the_noise;
+    if effects.is_empty() {
+        return if left_over { Verdict::Unexplained } else { Verdict::NoMismatch };
+    }
+    // What fits the past and not the future was never excited enough to be told.
+    if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
+        return Verdict::NotExcited;
+    }
+    if left_over && findings.remainder > FORM_ERROR {
+        return Verdict::Unexplained;
+    }
+    if effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
+}
+
+fn effects<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    selected: &Hypothesis<T>,
+    places: &[Place],
+    findings: &Findings,
+) -> Vec<Effect> {
+    let mut at = inquiry.twin.parameters().len();
+    let mut effects: Vec<Effect> = Vec::new();
+    for (number, place) in selected.added.iter().zip(places) {
+        let candidate = &inquiry.candidates[*number];
+        let (confidence, others) = confidences(place);
+        let parameters = candidate
+            .form
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(k, p)| {
+                let (value, std) = (findings.trued.values[at + k], findings.std[at + k]);
+                (p.name.clone().into_owned(), Estimate { value, std, unit: inquiry.twin.unit(&p.unit) })
+            })
+            .collect();
+        at += candidate.form.parameters.len();
+        let mut rivals: Vec<Rival> = Vec::new();
+        for ((other, _), confidence) in place.others.iter().zip(others) {
+            let mechanism = inquiry.candidates[*other].about.name.to_owned();
+            match rivals.iter_mut().find(|r| r.mechanism == mechanism) {
+                Some(rival) => rival.confidence += confidence,
+                None => rivals.push(Rival { mechanism, confidence }),
+            }
+        }
+        rivals.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        effects.push(Effect {
+            mechanism: candidate.about.name.to_owned(),
+            site: candidate.about.site,
+            confidence,
+            parameters,
+            rivals,
+            location: None,
+        });
+    }
+    effects.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    effects
+}
+
+fn parameters<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    selected: &Hypothesis<T>,
+    findings: &Findings,
+) -> BTreeMap<String, ParameterChange> {
+    let own = inquiry.twin.parameters().len();
+    selected.twin.parameters()[..own]
+        .iter()
+        .enumerate()
+        .map(|(k, p)| {
+            let change = ParameterChange {
+                nominal: p.nominal,
+                value: findings.trued.values[k],
+                std: findings.std[k],
+                unit: inquiry.twin.unit(&p.unit),
+            };
+            (p.name.clone().into_owned(), change)
+        })
+        .collect()
+}
+
+fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> Vec<String> {
+    let parts = inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out);
+    let mut notes: Vec<String> = parts.flat_map(|p| inquiry.twin.notes(p.recording)).collect();
+    notes.dedup();
+    if let Some(seconds) = inquiry.evidence.window {
+        notes.push(format!(
+            "this plant does not forget where it started, so hypotheses were compared on windows of {seconds:.2} s, each \
+             started afresh; errors in `fit` are of the free run"
+        ));
+    }
+    if let Some(dependence) = &findings.dependence {
+        notes.push(format!(
+            "what is left depends most on {} (-log10 p = {:.1}; above {DEPENDENT} it counts)",
+            dependence.on, dependence.strength
+        ));
+    } else {
+        notes.push(format!(
+            "a regression on the motion foretells {:.1} % of what is left on held-out data (above {:.0} % it counts)",
+            100.0 * findings.foretold,
+            100.0 * FORETOLD
+        ));
+    }
+    notes
+}
+
+fn next_experiment(verdict: Verdict, effects: &[Effect]) -> Option<NextExperiment> {
+    let rival = effects.iter().find(|e| !e.rivals.is_empty() && verdict == Verdict::Ambiguous)?;
+    let others: Vec<&str> = rival.rivals.iter().map(|r| r.mechanism.as_str()).collect();
+    Some(NextExperiment {
+        what: format!(
+            "record with other amplitudes and frequencies, so that {} and {} no longer look alike",
+            rival.mechanism,
+            others.join(", ")
+        ),
+    })
+}
+
+fn summary<T: Twin>(inquiry: &Inquiry<'_, T>, verdict: Verdict, effects: &[Effect], findings: &Findings) -> String {
+    let title = |id: &str| {
+        inquiry.candidates.iter().find(|c| c.about.name == id).map_or_else(|| id.to_owned(), |c| c.about.title.to_owned())
+    };
+    let names = listed(&effects.iter().map(|e| title(&e.mechanism)).collect::<Vec<_>>());
+    let name = inquiry.twin.name();
+    let best = findings.fits.iter().max_by(|a, b| a.improvement_ci95[0].total_cmp(&b.improvement_ci95[0]));
+    let gained = best.map_or_else(String::new, |f| {
+        format!(
+            "the held-out error of {} falls from {:.3e} to {:.3e} {} (noise floor {:.1e})",
+            f.channel, f.recalibrated_rmse, f.trued_rmse, f.unit, f.noise_floor
+        )
+    });
+    match verdict {
+        Verdict::Named => format!("The {name} leaves out {names}: with it modelled, {gained}."),
+        Verdict::Ambiguous => {
+            let rivals: Vec<String> = effects.iter().flat_map(|e| e.rivals.iter()).map(|r| title(&r.mechanism)).collect();
+            format!("The {name} leaves out {names}, or {} instead: these data do not tell; {gained}.", listed(&rivals))
+        }
+        Verdict::NoMismatch => format!(
+            "The {name} explains the recordings once its own parameters are refitted: nothing is missing that these data show."
+        ),
+        Verdict::NotExcited => format!(
+            "{names} would explain the fitted data but not those held out: these recordings do not move the {name} enough to tell."
+        ),
+        Verdict::Unexplained if effects.is_empty() => format!(
+            "Something is missing from the {name} that none of the {} known mechanisms explains{}.",
+            inquiry.candidates.len(),
+            shape(findings)
+        ),
+        Verdict::Unexplained => format!(
+            "Something is missing from the {name} that no known mechanism explains: {names} takes part of it, {:.0} % of the misfit is left{}.",
+            100.0 * findings.remainder,
+            shape(findings)
+        ),
+    }
+}
+
+fn shape(findings: &Findings) -> String {
+    findings.dependence.as_ref().map_or_else(String::new, |d| format!("; what is left depends on the {}", d.on))
+}
+
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => "nothing".to_owned(),
+        [one] => one.clone(),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}

@@ -1,0 +1,142 @@
+//! How much independent evidence residuals hold, and whether anything is left in them.
+
+use crate::sim2real::identify::Block;
+
+/// Lags over which [`adequacy`] looks.
+const LAGS: usize = 40;
+
+/// Residuals of one channel over all parts: sum of squares, number, and autocorrelation time.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ChannelMisfit {
+    pub channel: String,
+    pub sum_of_squares: f64,
+    pub count: usize,
+    /// In rows; at least 1 for uncorrelated residuals, less for alternating ones.
+    pub autocorrelation_time: f64,
+}
+
+impl ChannelMisfit {
+    /// Number of independent residuals that hold as much evidence.
+    pub fn effective(&self) -> f64 {
+        self.count as f64 / self.autocorrelation_time
+    }
+}
+
+/// The misfit of every channel.
+pub(super) fn channel_misfits(residual: &[f64], blocks: &[Block]) -> Vec<ChannelMisfit> {
+    let mut channels: Vec<&str> = blocks.iter().map(|b| b.channel.as_str()).collect();
+    channels.dedup();
+    channels.sort_unstable();
+    channels.dedup();
+    channels
+        .into_iter()
+        .map(|channel| {
+            let series = of_channel(residual, blocks, channel);
+            ChannelMisfit {
+                channel: channel.to_owned(),
+                sum_of_squares: series.iter().flat_map(|s| s.iter()).map(|r| r * r).sum(),
+                count: series.iter().map(|s| s.len()).sum(),
+                autocorrelation_time: autocorrelation_time(&series),
+            }
+        })
+        .collect()
+}
+
+/// The residuals of one channel, one slice a part.
+pub(super) fn of_channel<'a>(residual: &'a [f64], blocks: &[Block], channel: &str) -> Vec<&'a [f64]> {
+    blocks.iter().filter(|b| b.channel == channel).map(|b| &residual[b.range.clone()]).collect()
+}
+
+/// `1 + 2 sum rho` over the initial positive sequence: pairs of neighbouring lags are added while their sum is positive
+/// (Geyer, "Practical Markov chain Monte Carlo", Statistical Science 7 (1992)). The mean is not taken off: a residual
+/// that stays on one side is one piece of evidence, however long it is.
+pub(super) fn autocorrelation_time(series: &[&[f64]]) -> f64 {
+    let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
+    let count: usize = series.iter().map(|s| s.len()).sum();
+    let Some(covariance) = autocovariances(series, longest).filter(|c| c[0] > 0.0) else { return 1.0 };
+    let mut time = -1.0;
+    for pair in covariance.chunks_exact(2) {
+        let sum = (pair[0] + pair[1]) / covariance[0];
+        if sum <= 0.0 {
+            break;
+        }
+        time += 2.0 * sum;
+    }
+    time.clamp(0.5, count.max(1) as f64)
+}
+
+/// Mean over [`LAGS`] lags of `N rho^2`: about 1 where nothing is left but white noise (Box & Pierce, JASA 65 (1970)).
+pub(super) fn adequacy(residual: &[f64], blocks: &[Block]) -> f64 {
+    let mut channels: Vec<&str> = blocks.iter().map(|b| b.channel.as_str()).collect();
+    channels.sort_unstable();
+    channels.dedup();
+    let of = |channel: &str| -> Option<f64> {
+        let series = of_channel(residual, blocks, channel);
+        let count: usize = series.iter().map(|s| s.len()).sum();
+        let covariance = autocovariances(&series, LAGS + 1).filter(|c| c[0] > 0.0)?;
+        let squares: f64 = covariance[1..].iter().map(|c| (c / covariance[0]).powi(2)).sum();
+        Some(count as f64 * squares / (covariance.len() - 1).max(1) as f64)
+    };
+    channels.into_iter().filter_map(of).fold(0.0, f64::max)
+}
+
+/// Sums of lagged products over all parts, none across a boundary, by fast Fourier transform.
+fn autocovariances(series: &[&[f64]], lags: usize) -> Option<Vec<f64>> {
+    let longest = series.iter().map(|s| s.len()).max()?;
+    let lags = lags.min(longest).max(1);
+    let mut total = vec![0.0; lags];
+    for part in series.iter().filter(|s| !s.is_empty()) {
+        let size = (2 * part.len()).next_power_of_two();
+        let mut planner = realfft::RealFftPlanner::<f64>::new();
+        let (forward, inverse) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+        let mut padded = forward.make_input_vec();
+        padded[..part.len()].copy_from_slice(part);
+        let mut spectrum = forward.make_output_vec();
+        forward.process(&mut padded, &mut spectrum).ok()?;
+        spectrum.iter_mut().for_each(|z| *z = realfft::num_complex::Complex::new(z.norm_sqr(), 0.0));
+        inverse.process(&mut spectrum, &mut padded).ok()?;
+        for (sum, product) in total.iter_mut().zip(&padded[..lags.min(part.len())]) {
+            *sum += product / size as f64;
+        }
+    }
+    Some(total)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim2real::Seed;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn autoregressive(phi: f64, count: usize) -> Vec<f64> {
+        let mut rng = Seed(11).stream("series");
+        let mut value = 0.0;
+        (0..count)
+            .map(|_| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                value = phi * value + noise;
+                value
+            })
+            .collect()
+    }
+
+    #[test]
+    fn autocorrelation_time_is_that_of_the_process() {
+        for phi in [0.0, 0.5, 0.9] {
+            let series = autoregressive(phi, 40_000);
+            let expected = (1.0 + phi) / (1.0 - phi);
+            let found = autocorrelation_time(&[&series]);
+            assert!((found / expected - 1.0).abs() < 0.25, "{phi}: {found} for {expected}");
+        }
+    }
+
+    #[test]
+    fn adequacy_is_about_one_for_white_noise_only() {
+        let of = |series: &[f64]| {
+            let block = Block { part: 0, channel: "y".into(), range: 0..series.len(), rows: (0..series.len()).collect() };
+            adequacy(series, &[block])
+        };
+        assert!((0.5..1.7).contains(&of(&autoregressive(0.0, 5_000))));
+        assert!(of(&autoregressive(0.5, 5_000)) > 20.0);
+    }
+}

@@ -1,0 +1,232 @@
+//! The residuals of a simulator over parts of recordings, and how they move with its parameters.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::sim2real::residual::residuals_into;
+use crate::sim2real::{ChannelWeight, Parameter, Part, Seed, Simulator, Thetas};
+
+/// Step of a finite difference, as a part of a parameter's scale: wide enough to smooth over the moments at which dry
+/// friction lets go, which move by whole steps of integration.
+const DIFFERENCE: f64 = 1e-4;
+
+/// What a residual that is not a number is taken for: worse than any other, and finite.
+const DIVERGED: f64 = 1e8;
+
+/// A simulator beside what it should explain.
+///
+/// The states from which parts start are no parameters of the fit: at each evaluation they are solved for, to first
+/// order, within their priors, and the residuals are what is left then (variable projection, Golub & Pereyra 1973).
+#[derive(Debug)]
+pub struct Problem<'a, S: Simulator> {
+    /// The simulator.
+    pub simulator: &'a S,
+    /// What it should explain.
+    pub parts: &'a [Part<'a, S::Stimulus>],
+    /// Noise of each channel.
+    pub weights: &'a [ChannelWeight],
+    /// Randomness of mechanisms that have any.
+    pub seed: Seed,
+}
+
+/// The rows of a residual vector that belong to one channel of one part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Block {
+    /// Number of the part.
+    pub part: usize,
+    /// The channel.
+    pub channel: String,
+    /// Where its values are in the residual vector.
+    pub range: Range<usize>,
+    /// The rows of the recording they belong to.
+    pub rows: Vec<usize>,
+}
+
+/// Residuals in units of the noise, and where they come from.
+#[derive(Debug, Clone)]
+pub struct Evaluation {
+    /// Measured minus simulated over noise, for all [`Block`]s; then what priors of initial states add.
+    pub residual: DVector<f64>,
+    /// Derivatives of the residual, one column a parameter asked for.
+    pub jacobian: DMatrix<f64>,
+    /// By how much each part's initial parameters should move, to first order.
+    pub initial_step: Vec<Vec<f64>>,
+}
+
+/// One part evaluated: residuals, and one column a perturbed parameter.
+struct Piece {
+    residual: DVector<f64>,
+    jacobian: DMatrix<f64>,
+    initial_step: Vec<f64>,
+}
+
+impl<S: Simulator> Problem<'_, S> {
+    /// The initial parameters of every part.
+    #[must_use]
+    pub fn initial(&self) -> Vec<Vec<Parameter>> {
+        self.parts.iter().map(|p| self.simulator.initial_parameters(p.recording, p.start)).collect()
+    }
+
+    /// Where the residuals of each channel of each part are.
+    #[must_use]
+    pub fn blocks(&self) -> Vec<Block> {
+        let mut blocks = Vec::new();
+        let mut at = 0;
+        for (number, part) in self.parts.iter().enumerate() {
+            for weight in self.weights {
+                let Some(measured) = part.recording.channel(&weight.channel) else { continue };
+                let rows: Vec<usize> = part.rows.clone().filter(|row| measured.samples[*row].is_some()).collect();
+                let range = at..at + rows.len();
+                at = range.end;
+                blocks.push(Block { part: number, channel: weight.channel.clone(), range, rows });
+            }
+        }
+        blocks
+    }
+
+    /// Residuals at `theta` (the simulator's parameters) and their derivatives by the parameters numbered in `free`.
+    ///
+    /// The parts start from `state`, to first order moved to where they are best started from.
+    #[must_use]
+    pub fn evaluate(&self, theta: &[f64], state: &State, free: &[usize]) -> Evaluation {
+        let pieces: Vec<Piece> = self
+            .parts
+            .par_iter()
+            .enumerate()
+            .map(|(number, part)| self.piece(part, theta, &state.initial[number], &state.values[number], state.misfit, free))
+            .collect();
+        self.assemble(&pieces, free.len())
+    }
+
+    /// Lays the pieces one after the other: all measured residuals first, then all prior rows.
+    fn assemble(&self, pieces: &[Piece], columns: usize) -> Evaluation {
+        let measured: Vec<usize> = pieces.iter().map(|p| p.residual.len() - p.initial_step.len()).collect();
+        let total: usize = pieces.iter().map(|p| p.residual.len()).sum();
+        let mut residual = DVector::zeros(total);
+        let mut jacobian = DMatrix::zeros(total, columns);
+        let (mut at, mut prior_at) = (0, measured.iter().sum());
+        for (piece, count) in pieces.iter().zip(measured) {
+            let priors = piece.initial_step.len();
+            for (from, to, rows) in [(0, at, count), (count, prior_at, priors)] {
+                residual.rows_mut(to, rows).copy_from(&piece.residual.rows(from, rows));
+                jacobian.rows_mut(to, rows).copy_from(&piece.jacobian.rows(from, rows));
+            }
+            at += count;
+            prior_at += priors;
+        }
+        Evaluation { residual, jacobian, initial_step: pieces.iter().map(|p| p.initial_step.clone()).collect() }
+    }
+
+    fn piece(
+        &self,
+        part: &Part<'_, S::Stimulus>,
+        theta: &[f64],
+        initial: &[Parameter],
+        start: &[f64],
+        misfit: f64,
+        free: &[usize],
+    ) -> Piece {
+        let parameters = self.simulator.parameters();
+        let steps: Vec<(usize, f64)> = free
+            .iter()
+            .map(|k| (*k, difference(&parameters[*k], theta[*k])))
+            .chain(initial.iter().enumerate().map(|(k, p)| (theta.len() + k, difference(p, start[k]))))
+            .collect();
+        let base: Vec<f64> = theta.iter().chain(start).copied().collect();
+        let mut lanes = vec![base.clone()];
+        for (k, step) in &steps {
+            let mut lane = base.clone();
+            lane[*k] += step;
+            lanes.push(lane);
+        }
+        let trajectories = self.simulator.rollout(&Thetas::from_lanes(&lanes), part.recording, part.followed(), self.seed);
+        let columns: Vec<DVector<f64>> = trajectories.iter().map(|t| self.residual(part, t)).collect();
+        let derivatives: Vec<DVector<f64>> =
+            columns[1..].iter().zip(&steps).map(|(moved, (_, step))| (moved - &columns[0]) / *step).collect();
+        project(&columns[0], &derivatives[..free.len()], &derivatives[free.len()..], initial, start, misfit)
+    }
+
+    fn residual(&self, part: &Part<'_, S::Stimulus>, trajectory: &[crate::sim2real::Simulated]) -> DVector<f64> {
+        let mut out = Vec::new();
+        residuals_into(part, trajectory, self.weights, &mut out);
+        out.iter_mut().filter(|r| !r.is_finite()).for_each(|r| *r = DIVERGED);
+        DVector::from_vec(out)
+    }
+}
+
+/// Initial states of all parts during a fit.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// The initial parameters of each part, with their priors.
+    pub initial: Vec<Vec<Parameter>>,
+    /// Their values as they stand.
+    pub values: Vec<Vec<f64>>,
+    /// Root mean square residual that the priors are held against, at least 1: what a wrong model cannot explain must
+    /// not bend the initial state, however small the noise is.
+    pub misfit: f64,
+}
+
+impl State {
+    /// All parts at the estimates their recordings give.
+    #[must_use]
+    pub fn estimated<S: Simulator>(problem: &Problem<'_, S>) -> Self {
+        let initial = problem.initial();
+        Self::at_nominal(initial)
+    }
+
+    /// All parts at the estimates their recordings give, which count for nothing: the fit alone decides.
+    #[must_use]
+    pub fn unknown<S: Simulator>(problem: &Problem<'_, S>) -> Self {
+        let mut initial = problem.initial();
+        initial.iter_mut().flatten().filter(|p| !p.frozen()).for_each(|p| p.prior = None);
+        Self::at_nominal(initial)
+    }
+
+    fn at_nominal(initial: Vec<Vec<Parameter>>) -> Self {
+        let values = initial.iter().map(|p| p.iter().map(|p| p.nominal).collect()).collect();
+        Self { initial, values, misfit: 1.0 }
+    }
+}
+
+/// A step for the finite difference by `parameter` at `value`, towards the inside of its bounds.
+fn difference(parameter: &Parameter, value: f64) -> f64 {
+    let step = DIFFERENCE * parameter.scale().max(0.1 * if value.is_finite() { value.abs() } else { 0.0 });
+    if value + step > parameter.upper { -step } else { step }
+}
+
+/// Takes out of residual and derivatives what the initial state explains, within its priors.
+///
+/// With `A = [J_i; W]`, where `W` holds the priors' weights, the best step of the initial state leaves
+/// `b - Q Q' b` of `b = [r; W d]`, and likewise of every column of the Jacobian.
+fn project(
+    residual: &DVector<f64>,
+    derivatives: &[DVector<f64>],
+    by_initial: &[DVector<f64>],
+    initial: &[Parameter],
+    start: &[f64],
+    misfit: f64,
+) -> Piece {
+    let (rows, count) = (residual.len(), initial.len());
+    let weight: Vec<f64> = initial.iter().map(|p| p.prior.map_or(0.0, |std| misfit / std.max(1e-12 * p.scale()))).collect();
+    let extended = |top: &DVector<f64>, bottom: &dyn Fn(usize) -> f64| {
+        DVector::from_fn(rows + count, |i, _| if i < rows { top[i] } else { bottom(i - rows) })
+    };
+    let b = extended(residual, &|k| weight[k] * (start[k] - initial[k].nominal));
+    let columns: Vec<DVector<f64>> = derivatives.iter().map(|d| extended(d, &|_| 0.0)).collect();
+    let jacobian = |columns: &[DVector<f64>]| {
+        if columns.is_empty() { DMatrix::zeros(rows + count, 0) } else { DMatrix::from_columns(columns) }
+    };
+    if count == 0 {
+        return Piece { residual: b, jacobian: jacobian(&columns), initial_step: Vec::new() };
+    }
+    let a: Vec<DVector<f64>> =
+        by_initial.iter().enumerate().map(|(k, d)| extended(d, &|i| if i == k { weight[k] } else { 0.0 })).collect();
+    let qr = DMatrix::from_columns(&a).qr();
+    let (q, r) = (qr.q(), qr.r());
+    let without = |v: &DVector<f64>| v - &q * q.tr_mul(v);
+    let step = r.solve_upper_triangular(&(-q.tr_mul(&b))).unwrap_or_else(|| DVector::zeros(count));
+    let columns: Vec<DVector<f64>> = columns.iter().map(without).collect();
+    Piece { residual: without(&b), jacobian: jacobian(&columns), initial_step: step.iter().copied().collect() }
+}
