@@ -355,7 +355,7 @@ impl Strategy for Moody {
         1
     }
     fn on_event(&mut self, _: &View<'_>, orders: &mut Orders) {
-        if self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed) % 7 == 0 {
+        if self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed).is_multiple_of(7) {
             orders.market(0, Side::Buy, Quantity::nearest(1.0).unwrap());
         }
     }
