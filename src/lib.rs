@@ -15,3 +15,5 @@ pub mod market;
 pub mod report;
 pub mod robot;
 pub mod sim2real;
+#[path = "../strategies/mod.rs"]
+pub mod strategies;

@@ -1,37 +1,68 @@
 //! Markets: what is traded, the backtest that trades it, and `execution`, the plant every order meets.
 
+mod backtest;
+mod bar;
+mod blotter;
 mod book;
+mod check;
 mod covariate;
+mod daily;
 mod execution;
+mod feed;
+mod history;
+#[cfg(feature = "io")]
+mod history_file;
 mod instrument;
+mod ledger;
 mod log_entry;
 #[cfg(feature = "io")]
 mod log_folder;
 pub mod mechanism;
+pub mod metric;
+mod money;
 mod order;
 mod order_log;
 mod own_print;
 mod price_assumption;
 mod quote;
+#[cfg(feature = "io")]
+mod run_log;
+mod session;
+mod strategy;
 mod tape;
 #[cfg(feature = "io")]
 mod tape_file;
 #[cfg(feature = "io")]
 mod twin;
+mod venue;
 
+pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
+pub use bar::{Bar, Stamp, common_spacing};
+pub use blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
 pub use book::{Book, Level, Walk};
+pub use check::{check_strategy, check_strategy_on};
+pub use daily::Daily;
 pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
+pub use feed::Feed;
+pub use history::{History, HistoryError};
 pub use instrument::Instrument;
+pub use ledger::{Ledger, Position, Trade};
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
 #[cfg(feature = "io")]
 pub use log_folder::{LogSettings, read_log};
 pub use mechanism::MECHANISMS;
+pub use money::{Cash, Increments, MoneyError, Price, Quantity};
 pub use order::{InFlight, Posted, Side};
 pub use order_log::{LogMarket, OrderLog};
 pub use own_print::{Piece, own_print, shown_delay};
 pub use price_assumption::PriceAssumption;
 pub use quote::{Quote, QuoteSlice, Quotes};
+#[cfg(feature = "io")]
+pub use run_log::{InputHash, Provenance, RunSummary};
+pub use session::Session;
+pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
 pub use tape::{Print, Seen, Tape, TapeBar};
+pub use venue::{Answer, Reference, Venue};
 #[cfg(feature = "io")]
 pub use tape_file::{TapeFiles, read_tape};
 #[cfg(feature = "io")]

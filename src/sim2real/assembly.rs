@@ -137,7 +137,14 @@ impl<P: Plant> Run<P> {
         &mut self.commands
     }
 
-    /// Lets the commands last sent act on the plant, which meets `input` of each lane's command.
+    /// Puts commands that were sent earlier, and have been on their way since, before the plant: one a lane. Where several
+    /// messages are under way at once, the last sent need not be the next to arrive.
+    pub fn deliver(&mut self, arriving: &[P::Command]) {
+        self.commands.clear();
+        self.commands.extend_from_slice(arriving);
+    }
+
+    /// Lets the commands last sent or delivered act on the plant, which meets `input` of each lane's command.
     pub fn advance(&mut self, tick: Tick, input: impl Fn(&P::Command) -> P::Input) {
         self.inputs.clear();
         self.inputs.extend(self.commands.iter().map(input));

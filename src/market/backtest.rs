@@ -1,0 +1,176 @@
+//! The backtest: what it is set up of, and what it leaves. Its loop is a [`Session`].
+
+use crate::sim2real::{Assembly, Seed, Timestamp};
+
+use super::blotter::Blotter;
+use super::{Cash, Execution, History, Increments, Instrument, Ledger, MoneyError, Reference, Session, Strategy};
+
+/// A backtest, as it was set up.
+#[derive(Debug, Clone)]
+pub struct Backtest {
+    pub(super) instruments: Vec<Instrument>,
+    pub(super) increments: Vec<Increments>,
+    pub(super) histories: Vec<History>,
+    pub(super) venue: Assembly<Execution>,
+    pub(super) settings: Settings,
+}
+
+/// What else a backtest depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Cash it begins with.
+    pub cash: Cash,
+    /// Where the randomness of mechanisms comes from.
+    pub seed: Seed,
+    /// Largest sum of positions, short ones counted as positive, as a multiple of equity. An order that would exceed it,
+    /// at the prices of its decision, is refused unless it makes the sum smaller; moves of prices are not policed.
+    pub max_leverage: f64,
+    /// The price mechanisms start from where there are quotes; none for what suits the mechanisms.
+    pub reference: Option<Reference>,
+}
+
+impl Settings {
+    /// No borrowing: the sum of positions stays within the equity.
+    #[must_use]
+    pub fn with_cash(cash: Cash) -> Self {
+        Self { cash, seed: Seed::default(), max_leverage: 1.0, reference: None }
+    }
+}
+
+/// A backtest that cannot be set up or go on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BacktestError {
+    /// No instrument has any data.
+    #[error("there is nothing to run on\nhint: give at least one bar or quote between `start` and `end`")]
+    NoData,
+    /// Instruments and histories do not match.
+    #[error("there are {instruments} instruments and data for {histories}\nhint: give each instrument its data")]
+    Unmatched {
+        /// Number of instruments.
+        instruments: usize,
+        /// Number of histories.
+        histories: usize,
+    },
+    /// A leverage that cannot be.
+    #[error("max_leverage is {0}\nhint: it is a number above 0; 1 borrows nothing")]
+    Leverage(f64),
+    /// An amount that is no amount.
+    #[error("{place}: {error}")]
+    Money {
+        /// Where it came up.
+        place: String,
+        /// What is wrong with it.
+        error: MoneyError,
+    },
+    /// Mechanisms that give a price no market has.
+    #[error(
+        "order {order_id} for {symbol} at {time}: its mechanisms give a price of {price}\nhint: check the size of their parameters; impacts are for small parts of a day's volume"
+    )]
+    ModelPrice {
+        /// The order.
+        order_id: u64,
+        /// Its instrument.
+        symbol: String,
+        /// When it met the market.
+        time: Timestamp,
+        /// The price.
+        price: f64,
+    },
+}
+
+/// The account's worth at an event.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EquityPoint {
+    /// When.
+    pub time: Timestamp,
+    /// Cash and positions [currency], the nearest floating-point number.
+    pub equity: f64,
+}
+
+/// How much was held, over all events.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Held {
+    /// Number of events.
+    pub events: usize,
+    /// Events at which something was held.
+    pub invested: usize,
+    /// Sum over events of what was held, short positions counted as positive, over equity.
+    pub leverage: f64,
+}
+
+/// All that a backtest leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Orders, fills and refusals.
+    pub blotter: Blotter,
+    /// One point an event, and one for fills after the last.
+    pub equity: Vec<EquityPoint>,
+    /// The account at the end.
+    pub ledger: Ledger,
+    /// How much was held.
+    pub held: Held,
+}
+
+impl Backtest {
+    /// A backtest of `instruments` on `histories` (one an instrument, in the same order), with orders filled by `venue`.
+    ///
+    /// # Errors
+    /// If there are no data, the two differ in number, or a tick size, lot size or the leverage cannot be.
+    pub fn new(
+        instruments: Vec<Instrument>,
+        histories: Vec<History>,
+        venue: Assembly<Execution>,
+        settings: Settings,
+    ) -> Result<Self, BacktestError> {
+        if instruments.len() != histories.len() {
+            return Err(BacktestError::Unmatched { instruments: instruments.len(), histories: histories.len() });
+        }
+        if histories.iter().all(|history| history.bars().is_empty() && history.quotes().is_empty()) {
+            return Err(BacktestError::NoData);
+        }
+        if !settings.max_leverage.is_finite() || settings.max_leverage <= 0.0 {
+            return Err(BacktestError::Leverage(settings.max_leverage));
+        }
+        let increments = instruments
+            .iter()
+            .map(|i| Increments::of(i).map_err(|error| BacktestError::Money { place: i.symbol.clone(), error }))
+            .collect::<Result<_, _>>()?;
+        Ok(Self { instruments, increments, histories, venue, settings })
+    }
+
+    /// The instruments.
+    #[must_use]
+    pub fn instruments(&self) -> &[Instrument] {
+        &self.instruments
+    }
+
+    /// Their data.
+    #[must_use]
+    pub fn histories(&self) -> &[History] {
+        &self.histories
+    }
+
+    /// The same backtest on other data.
+    ///
+    /// # Errors
+    /// As [`Backtest::new`].
+    pub fn on(&self, histories: Vec<History>) -> Result<Self, BacktestError> {
+        Self::new(self.instruments.clone(), histories, self.venue.clone(), self.settings)
+    }
+
+    /// Starts it, before its first event.
+    #[must_use]
+    pub fn start(&self) -> Session<'_> {
+        Session::new(self)
+    }
+
+    /// Runs it from the first event to the last.
+    ///
+    /// # Errors
+    /// If an amount overflows, or a mechanism gives a price no market has.
+    pub fn run(&self, strategy: &mut dyn Strategy) -> Result<Record, BacktestError> {
+        let mut session = self.start();
+        while session.step(strategy)?.is_some() {}
+        session.finish()
+    }
+}

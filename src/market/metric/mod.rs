@@ -1,0 +1,169 @@
+//! What a backtest came to, in figures. A figure that is not defined for a run is none, never NaN or infinity.
+
+mod cost;
+mod drawdown;
+mod returns;
+
+use serde::Serialize;
+
+use super::{Fill, Held, Instrument, MoneyError, Record, Status};
+
+pub use cost::Costs;
+pub use drawdown::Drawdown;
+pub use returns::{Returns, Sampling};
+
+/// The figures of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Cash at the start [currency].
+    pub initial_equity: f64,
+    /// Cash and positions at the end [currency].
+    pub final_equity: f64,
+    /// `final_equity / initial_equity - 1` (a fraction).
+    pub total_return: Option<f64>,
+    /// Return a year of 365.25 days, compounded (a fraction); none for less than a day of data.
+    pub cagr: Option<f64>,
+    /// Volatility and Sharpe ratio, with the sampling they rest on.
+    #[serde(flatten)]
+    pub returns: Returns,
+    /// The deepest fall from an earlier high; none where equity never fell.
+    pub max_drawdown: Option<Drawdown>,
+    /// Value traded, both ways, over mean equity.
+    pub turnover: Option<f64>,
+    /// Part of all events at which something was held.
+    pub exposure: Option<f64>,
+    /// Mean over all events of what was held, short positions counted as positive, over equity.
+    pub mean_leverage: Option<f64>,
+    /// Part of the fills that closed something which gained after their own fee.
+    pub hit_rate: Option<f64>,
+    /// Gain on what was closed, at average cost, before fees [currency].
+    pub realised: f64,
+    /// Gain on what is still held, at its last price, before fees [currency].
+    pub unrealised: f64,
+    /// What trading cost.
+    pub costs: Costs,
+}
+
+/// How many of everything there was.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Events: bars and quotes.
+    pub events: usize,
+    /// Orders sent.
+    pub orders: usize,
+    /// Orders filled whole.
+    pub filled: usize,
+    /// Orders of which some was cancelled, because there was no volume for it.
+    pub cancelled: usize,
+    /// Orders that had met no market when the data ended.
+    pub unfilled: usize,
+    /// Fills.
+    pub fills: usize,
+    /// Orders refused, by reason.
+    pub rejected: std::collections::BTreeMap<super::Reason, usize>,
+}
+
+impl Counts {
+    /// The counts of `record`.
+    #[must_use]
+    pub fn of(record: &Record) -> Self {
+        let blotter = &record.blotter;
+        Self {
+            events: record.held.events,
+            orders: blotter.orders.len(),
+            filled: blotter.count(Status::Filled),
+            cancelled: blotter.count(Status::Cancelled),
+            unfilled: blotter.count(Status::Unfilled),
+            fills: blotter.fills.len(),
+            rejected: blotter.rejected.clone(),
+        }
+    }
+}
+
+impl Metrics {
+    /// The figures of `record`.
+    ///
+    /// # Errors
+    /// If an amount of cash is beyond what can be held.
+    pub fn of(record: &Record) -> Result<Self, MoneyError> {
+        let initial = record.ledger.opening().to_f64();
+        let last = record.ledger.equity()?.to_f64();
+        let points = &record.equity;
+        let years = match (points.first(), points.last()) {
+            (Some(first), Some(last)) => returns::years(first.time, last.time),
+            _ => 0.0,
+        };
+        let growth = if initial > 0.0 { defined(last / initial) } else { None };
+        let mean_equity = points.iter().map(|point| point.equity).sum::<f64>() / points.len() as f64;
+        let traded: f64 = record.blotter.fills.iter().map(|fill| (fill.price * fill.quantity).to_f64()).sum();
+        let (mut realised, mut unrealised) = (0.0, 0.0);
+        for position in record.ledger.positions() {
+            realised += position.realised.to_f64();
+            unrealised += position.value().minus(position.basis)?.to_f64();
+        }
+        let Held { events, invested, leverage } = record.held;
+        let per_event = |sum: f64| if events > 0 { Some(sum / events as f64) } else { None };
+        let a_day = 1.0 / returns::DAYS_A_YEAR;
+        Ok(Self {
+            initial_equity: initial,
+            final_equity: last,
+            total_return: growth.map(|g| g - 1.0),
+            cagr: growth.filter(|g| *g > 0.0 && years >= a_day).and_then(|g| defined(g.powf(1.0 / years) - 1.0)),
+            returns: Returns::of(points),
+            max_drawdown: Drawdown::deepest(initial, points),
+            turnover: if mean_equity > 0.0 { defined(traded / mean_equity) } else { None },
+            exposure: per_event(invested as f64),
+            mean_leverage: per_event(leverage),
+            hit_rate: hit_rate(&record.blotter.fills),
+            realised,
+            unrealised,
+            costs: Costs::of(&record.blotter),
+        })
+    }
+}
+
+fn hit_rate(fills: &[Fill]) -> Option<f64> {
+    let gains: Vec<bool> = fills.iter().filter_map(|fill| fill.realised.map(|gain| gain > fill.fee)).collect();
+    let hits = gains.iter().filter(|hit| **hit).count();
+    defined(hits as f64 / gains.len() as f64)
+}
+
+/// The number, where it is one.
+fn defined(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+/// What one instrument came to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InstrumentSummary {
+    /// Symbol.
+    pub symbol: String,
+    /// Held at the end [units], negative when short.
+    pub position: f64,
+    /// Gain on what was closed, before fees [currency].
+    pub realised: f64,
+    /// Gain on what is held, before fees [currency].
+    pub unrealised: f64,
+    /// Fees [currency].
+    pub fees: f64,
+    /// Number of fills.
+    pub fills: usize,
+}
+
+impl InstrumentSummary {
+    /// One summary an instrument.
+    #[must_use]
+    pub fn of(record: &Record, instruments: &[Instrument]) -> Vec<Self> {
+        let positions = record.ledger.positions().iter().zip(instruments).enumerate();
+        positions
+            .map(|(k, (position, instrument))| Self {
+                symbol: instrument.symbol.clone(),
+                position: position.quantity.to_f64(),
+                realised: position.realised.to_f64(),
+                unrealised: position.value().to_f64() - position.basis.to_f64(),
+                fees: position.fees.to_f64(),
+                fills: record.blotter.fills.iter().filter(|fill| fill.instrument == k).count(),
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,172 @@
+//! The strategies that come with the crate: one a file, one row each in [`STRATEGIES`], with an example beside it.
+
+mod buy_and_hold;
+mod sma_cross;
+
+pub use buy_and_hold::BuyAndHold;
+pub use sma_cross::SmaCross;
+
+use crate::market::Strategy;
+
+/// A row of the registry.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind {
+    /// Its id, as a run's `kind`.
+    pub name: &'static str,
+    /// What it does, in one sentence.
+    pub about: &'static str,
+    /// A `[strategy]` table to copy.
+    pub example: &'static str,
+    /// Names of its parameters.
+    pub parameters: &'static [&'static str],
+    /// Makes one from its parameters: the `[strategy]` table without `kind`.
+    pub build: fn(toml::Table) -> Result<Box<dyn Strategy>, StrategyError>,
+}
+
+/// The strategies a run can name.
+pub static STRATEGIES: &[Kind] = &[buy_and_hold::KIND, sma_cross::KIND];
+
+/// A `[strategy]` table that makes no strategy.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StrategyError {
+    /// No `kind`, or one that is no text.
+    #[error("[strategy] does not say its `kind`\nhint: add kind = \"sma_cross\"; there are {0}")]
+    NoKind(String),
+    /// A kind that is not in the registry.
+    #[error("[strategy] kind = \"{found}\" is not known\nhint: {hint}")]
+    Unknown {
+        /// What was found.
+        found: String,
+        /// What may be meant.
+        hint: String,
+    },
+    /// A parameter that is missing, unknown or of the wrong type.
+    #[error("[strategy] {kind}: {message}\nhint: its parameters are {parameters}")]
+    Parameter {
+        /// The strategy.
+        kind: &'static str,
+        /// What is wrong.
+        message: String,
+        /// The parameters it has.
+        parameters: String,
+    },
+    /// A parameter whose value cannot be.
+    #[error("[strategy] {kind}: {parameter} is {value}\nhint: {hint}")]
+    Value {
+        /// The strategy.
+        kind: &'static str,
+        /// The parameter.
+        parameter: &'static str,
+        /// What was found.
+        value: String,
+        /// The remedy.
+        hint: &'static str,
+    },
+}
+
+/// The strategy a `[strategy]` table describes.
+///
+/// # Errors
+/// If its kind is not known, or a parameter is missing, unknown, of the wrong type or of a value that cannot be.
+pub fn build(table: &toml::Table) -> Result<Box<dyn Strategy>, StrategyError> {
+    let mut parameters = table.clone();
+    let found = match parameters.remove("kind") {
+        Some(toml::Value::String(kind)) => kind,
+        _ => return Err(StrategyError::NoKind(names())),
+    };
+    match STRATEGIES.iter().find(|kind| kind.name == found) {
+        Some(kind) => (kind.build)(parameters),
+        None => Err(StrategyError::Unknown { hint: hint(&found), found }),
+    }
+}
+
+fn names() -> String {
+    STRATEGIES.iter().map(|kind| format!("`{}`", kind.name)).collect::<Vec<_>>().join(", ")
+}
+
+fn hint(found: &str) -> String {
+    let distance = |kind: &&Kind| strsim::damerau_levenshtein(kind.name, &found.to_lowercase());
+    match STRATEGIES.iter().min_by_key(distance).filter(|kind| distance(kind) <= kind.name.len() / 2) {
+        Some(kind) => format!("did you mean `{}`?", kind.name),
+        None => format!("there are {}", names()),
+    }
+}
+
+/// Reads the parameters of `kind`, unknown keys being errors.
+fn read<'de, P: serde::Deserialize<'de>>(kind: &Kind, parameters: toml::Table) -> Result<P, StrategyError> {
+    P::deserialize(toml::Value::Table(parameters)).map_err(|error| StrategyError::Parameter {
+        kind: kind.name,
+        message: error.message().trim().to_owned(),
+        parameters: kind.parameters.join(", "),
+    })
+}
+
+/// Holds a weight to what a weight can be.
+fn check_weight(kind: &Kind, weight: f64) -> Result<(), StrategyError> {
+    if weight.is_finite() && weight > 0.0 {
+        return Ok(());
+    }
+    let hint = "it is the part of equity to hold, above 0; above 1 needs `max_leverage` in [run]";
+    Err(StrategyError::Value { kind: kind.name, parameter: "weight", value: weight.to_string(), hint })
+}
+
+/// All of the equity but for a part in a hundred: what a gap at the next open, the spread and fees may take.
+fn most_of_it() -> f64 {
+    0.99
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::market::check_strategy;
+    use crate::sim2real::Seed;
+
+    fn error(text: &str) -> String {
+        build(&toml::from_str(text).unwrap()).err().unwrap().to_string()
+    }
+
+    #[test]
+    fn every_row_is_built_from_its_example_and_keeps_the_contract() {
+        for kind in STRATEGIES {
+            let example: toml::Table = toml::from_str(kind.example).unwrap();
+            let table = example["strategy"].as_table().unwrap().clone();
+            assert_eq!(table["kind"].as_str(), Some(kind.name));
+            for parameter in table.keys().filter(|key| *key != "kind") {
+                assert!(kind.parameters.contains(&parameter.as_str()), "{parameter} of {}", kind.name);
+            }
+            assert_eq!(build(&table).unwrap().name(), kind.name);
+            for seed in 0..3 {
+                check_strategy(|_| build(&table).unwrap(), Seed(seed)).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn a_table_that_makes_no_strategy_says_why() {
+        for (table, expected) in [
+            (
+                "kind = 'sma_corss'\nfast = 1",
+                "[strategy] kind = \"sma_corss\" is not known\nhint: did you mean `sma_cross`?",
+            ),
+            ("kind = 'moon'", "[strategy] kind = \"moon\" is not known\nhint: there are `buy_and_hold`, `sma_cross`"),
+            (
+                "fast = 1",
+                "[strategy] does not say its `kind`\nhint: add kind = \"sma_cross\"; there are `buy_and_hold`, `sma_cross`",
+            ),
+            (
+                "kind = 'sma_cross'\nfast = 50\nslow = 10",
+                "[strategy] sma_cross: slow is 10\nhint: `slow` must be above `fast`",
+            ),
+        ] {
+            assert_eq!(error(table), expected);
+        }
+        let unknown = error("kind = 'sma_cross'\nfast = 10\nslow = 50\nwieght = 1.0");
+        assert!(
+            unknown.contains("`wieght`") && unknown.contains("its parameters are fast, slow, short, weight"),
+            "{unknown}"
+        );
+        assert!(error("kind = 'sma_cross'\nfast = 10").contains("missing field `slow`"));
+        assert!(error("kind = 'sma_cross'\nfast = -10\nslow = 5").contains("fast, slow"));
+        assert!(error("kind = 'buy_and_hold'\nweight = nan").contains("weight is NaN"));
+    }
+}
