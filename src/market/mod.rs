@@ -62,8 +62,8 @@ pub use run_log::{InputHash, Provenance, RunSummary};
 pub use session::Session;
 pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
 pub use tape::{Print, Seen, Tape, TapeBar};
-pub use venue::{Answer, Reference, Venue};
 #[cfg(feature = "io")]
 pub use tape_file::{TapeFiles, read_tape};
 #[cfg(feature = "io")]
 pub use twin::{execution_assembly, execution_logs, execution_twin};
+pub use venue::{Answer, Reference, Venue};
