@@ -26,6 +26,8 @@ mod own_print;
 mod price_assumption;
 mod quote;
 #[cfg(feature = "io")]
+mod run;
+#[cfg(feature = "io")]
 mod run_log;
 mod session;
 mod strategy;
@@ -58,12 +60,14 @@ pub use own_print::{Piece, own_print, shown_delay};
 pub use price_assumption::PriceAssumption;
 pub use quote::{Quote, QuoteSlice, Quotes};
 #[cfg(feature = "io")]
+pub use run::{RunSetUp, explained};
+#[cfg(feature = "io")]
 pub use run_log::{InputHash, Provenance, RunSummary};
 pub use session::Session;
 pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
 pub use tape::{Print, Seen, Tape, TapeBar};
-pub use venue::{Answer, Reference, Venue};
 #[cfg(feature = "io")]
 pub use tape_file::{TapeFiles, read_tape};
 #[cfg(feature = "io")]
 pub use twin::{execution_assembly, execution_logs, execution_twin};
+pub use venue::{Answer, Reference, Venue};
