@@ -31,6 +31,7 @@ pub struct Assembly<P: Plant> {
     registry: Registry<P>,
     parts: Vec<Part<P>>,
     parameters: Vec<Parameter>,
+    excluded: Vec<String>,
 }
 
 impl<P: Plant> fmt::Debug for Assembly<P> {
@@ -43,7 +44,7 @@ impl<P: Plant> Assembly<P> {
     /// A plant with no mechanisms yet, which may be given those of `registry`.
     #[must_use]
     pub fn new(plant: P, registry: Registry<P>) -> Self {
-        Self { parameters: plant.parameters(), plant: Arc::new(plant), registry, parts: Vec::new() }
+        Self { parameters: plant.parameters(), plant: Arc::new(plant), registry, parts: Vec::new(), excluded: Vec::new() }
     }
 
     /// The plant.
@@ -56,6 +57,14 @@ impl<P: Plant> Assembly<P> {
     #[must_use]
     pub fn registry(&self) -> Registry<P> {
         self.registry
+    }
+
+    /// The same assembly, which is not to be given the mechanisms of these ids: what a diagnosis says when it does not know
+    /// them tells whether it can be trusted not to name something else instead.
+    #[must_use]
+    pub fn excluding(mut self, ids: &[String]) -> Self {
+        self.excluded.extend_from_slice(ids);
+        self
     }
 
     /// Adds a mechanism in one of its forms, with the values its parameters have today.
@@ -312,7 +321,7 @@ impl<P: Plant> Twin for Assembly<P> {
         let mut candidates = Vec::new();
         for mechanism in self.registry {
             let about = mechanism.about();
-            if modelled.contains(&about.name) {
+            if modelled.contains(&about.name) || self.excluded.iter().any(|id| id == about.name) {
                 continue;
             }
             for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {

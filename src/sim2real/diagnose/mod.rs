@@ -109,7 +109,8 @@ pub fn diagnose<T: Twin>(
     let inquiry = Inquiry { twin, candidates: &candidates, evidence: &evidence, seed };
     let selection = select::select(&inquiry, progress);
     progress("looking for rivals", 0, 1);
-    let rivals = rivals::rivals(&inquiry, &selection);
+    let (mut selection, rivals) = rivals::settled(&inquiry, selection);
+    selection.mark_accepted(&candidates);
     progress("proving on held-out data", 0, 1);
     let recalibrated = inquiry.in_free_run(&selection.recalibrated);
     let trued = inquiry.in_free_run(&selection.selected);

@@ -20,8 +20,29 @@ pub(super) struct Place {
     pub others: Vec<(usize, f64)>,
 }
 
+/// Swaps tried at the most.
+const SWAPS: usize = 4;
+
+/// Puts rivals that do better in the place of what was selected, until none does; then lists those that remain.
+pub(super) fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, mut selection: Selection<T>) -> (Selection<T>, Vec<Place>) {
+    for _ in 0..SWAPS {
+        let places = rivals(inquiry, &selection);
+        let best = places
+            .iter()
+            .enumerate()
+            .flat_map(|(place, p)| p.others.iter().map(move |(other, loss)| (place, *other, *loss)))
+            .filter(|(_, _, loss)| *loss < 0.0)
+            .min_by(|a, b| a.2.total_cmp(&b.2));
+        let Some((place, other, _)) = best else { return (selection, places) };
+        let Some(swapped) = selection.swapped(inquiry, place, other) else { return (selection, places) };
+        selection = swapped;
+    }
+    let places = rivals(inquiry, &selection);
+    (selection, places)
+}
+
 /// The rivals of each selected mechanism, in their order.
-pub(super) fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Place> {
+fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Place> {
     let selected = &selection.selected;
     selected
         .added

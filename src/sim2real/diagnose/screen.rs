@@ -106,12 +106,20 @@ fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usi
     Some(Screened { number, score, survival, starts, signature })
 }
 
-/// All combinations of the starts of a candidate's parameters.
+/// All combinations of the starts of a candidate's parameters; before them, where there is one parameter, a tenth of the
+/// way to its first start: small enough to tell the direction in which its effect begins.
 fn starts(candidate: &Candidate) -> Vec<Vec<f64>> {
-    candidate.form.parameters.iter().fold(vec![Vec::new()], |so_far, parameter| {
+    let all = candidate.form.parameters.iter().fold(vec![Vec::new()], |so_far, parameter| {
         let own: Vec<f64> = if parameter.starts.is_empty() { vec![parameter.nominal] } else { parameter.starts.clone() };
         so_far.iter().flat_map(|head| own.iter().map(move |v| head.iter().copied().chain([*v]).collect())).collect()
-    })
+    });
+    let probe = match candidate.form.parameters.as_slice() {
+        [p] if p.smooth && p.nominal.is_finite() => {
+            p.starts.first().map(|start| vec![p.nominal + 0.1 * (start - p.nominal)])
+        }
+        _ => None,
+    };
+    probe.into_iter().chain(all).collect()
 }
 
 /// The start moved along its own direction by `factor`, where its law has one parameter and that is of some use.

@@ -6,21 +6,29 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
-use crate::sim2real::Twin;
+use crate::sim2real::{Candidate, Twin};
 
 /// A mechanism must gain more than this to be added.
 pub(super) const ACCEPT: f64 = 10.0;
-/// A further mechanism must explain at least this part of the first misfit.
+/// A further mechanism must explain at least this part of the first misfit, for laws never have quite the form of the
+/// real thing, and what they leave looks like something else ...
 const SHARE: f64 = 0.03;
+/// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
+const COMPLETES: f64 = 0.8;
 /// A mechanism must move at least this many rows by more than the noise.
 const INFORMATIVE_ROWS: usize = 25;
 /// Most mechanisms in a set.
-const STAGES: usize = 3;
+const STAGES: usize = 4;
+/// Where a first mechanism alone gains nothing, two may: they are tried while the mean squared residual is this many
+/// times the noise.
+const ABOVE_NOISE: f64 = 1.5;
 /// Hypotheses that each stage hands to the next: the best alone may be the wrong one to build on.
 const BEAM: usize = 3;
 /// Candidates fitted from each hypothesis of the beam.
 const FITTED: usize = 6;
-/// Candidates are fitted if their signature, with this many times the evidence the parent's residuals hold, could gain
+/// Candidates that are fitted however little evidence the parent's residuals seem to hold.
+const ALWAYS_FITTED: usize = 3;
+/// Others are fitted if their signature, with this many times the evidence the parent's residuals hold, could gain
 /// what acceptance asks for: once more is explained, residuals hold more evidence.
 const BENEFIT_OF_DOUBT: f64 = 4.0;
 
@@ -48,7 +56,8 @@ pub(super) fn select<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) 
         scores.extend(tried);
         let Some(best) = children.first().cloned() else { break };
         let parent = best_of_stage.last().unwrap_or(&recalibrated);
-        let promising = gain(inquiry, parent, &best) > 0.5 * ACCEPT;
+        let left = best.misfits.iter().any(|m| m.sum_of_squares > ABOVE_NOISE * m.count as f64);
+        let promising = gain(inquiry, parent, &best) > ACCEPT || left && stage == 0;
         best_of_stage.push(best);
         if !promising {
             break;
@@ -56,11 +65,29 @@ pub(super) fn select<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) 
         beam = children.into_iter().take(BEAM).collect();
     }
     let (selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
-    for score in &mut scores {
-        let place = selected.added.iter().position(|n| inquiry.candidates[*n].about.name == score.mechanism);
-        score.accepted = place == Some(score.stage);
-    }
     Selection { recalibrated, selected, without, scores }
+}
+
+impl<T: Twin> Selection<T> {
+    /// Marks the scores of what was selected, each in the last stage in which it was tried.
+    pub fn mark_accepted(&mut self, candidates: &[Candidate]) {
+        for number in &self.selected.added {
+            let Candidate { about, form, .. } = &candidates[*number];
+            let own = |s: &&mut Score| s.mechanism == about.name && s.form == form.name && s.gain.is_some();
+            if let Some(score) = self.scores.iter_mut().filter(own).max_by_key(|s| s.stage) {
+                score.accepted = true;
+            }
+        }
+    }
+
+    /// The selection with the `place`-th mechanism replaced by candidate `other`, and what is no longer needed left out.
+    pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
+        let less = &self.without[place];
+        let screened = inquiry.screened(less).into_iter().find(|s| s.number == other)?;
+        let (selected, without) = pruned(inquiry, &self.recalibrated, vec![inquiry.extended(less, other, &screened)]);
+        let better = gain(inquiry, &self.recalibrated, &selected) > gain(inquiry, &self.recalibrated, &self.selected);
+        better.then(|| Self { recalibrated: self.recalibrated.clone(), selected, without, scores: self.scores.clone() })
+    }
 }
 
 /// All sets one larger than those of the beam, best first, and how each mechanism did beside the best of the beam.
@@ -76,7 +103,8 @@ fn expand<T: Twin>(inquiry: &Inquiry<'_, T>, beam: &[Hypothesis<T>], stage: usiz
             let mut set: Vec<usize> = parent.set();
             set.push(one.number);
             set.sort_unstable();
-            let fitted = rank < FITTED && one.score > 0.0 && hopeful(one.score) && !sets.contains(&set);
+            let fitted =
+                rank < FITTED && one.score > 0.0 && (rank < ALWAYS_FITTED || hopeful(one.score)) && !sets.contains(&set);
             if fitted {
                 sets.push(set);
             }
@@ -144,11 +172,12 @@ fn pruned<T: Twin>(
 
 /// Whether `whole` explains enough more than `less`, in enough rows.
 fn needed<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, less: &Hypothesis<T>, whole: &Hypothesis<T>) -> bool {
-    let shares = first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).map(|((first, less), whole)| {
-        let above_noise = (first.sum_of_squares - first.count as f64).max(0.1 * first.sum_of_squares);
-        (less.sum_of_squares - whole.sum_of_squares) / above_noise
-    });
-    let enough = whole.added.len() == 1 || shares.fold(0.0, f64::max) >= SHARE;
+    let enough = whole.added.len() == 1
+        || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), whole)| {
+            let above_noise = |m: &ChannelMisfit| (m.sum_of_squares - m.count as f64).max(0.1 * m.sum_of_squares);
+            let explained = less.sum_of_squares - whole.sum_of_squares;
+            explained >= SHARE * above_noise(first) || explained >= COMPLETES * above_noise(less)
+        });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let moved = (0..rows).filter(|i| (less.fit.residual[*i] - whole.fit.residual[*i]).abs() > 1.0).count();
     // Effects below the noise show in the sum of many rows only: there, the gain alone decides.

@@ -109,9 +109,10 @@ pub(super) fn foretold(fitted: &[Left], held_out: &[Left], covariates: &BTreeMap
     let ridge = 1e-2 * x.nrows() as f64;
     (0..x.ncols()).for_each(|k| information[(k, k)] += ridge);
     let Some(inverse) = information.try_inverse() else { return 0.0 };
-    let weights = inverse * x.tr_mul(&target);
+    let mean = target.mean();
+    let weights = inverse * x.tr_mul(&target.add_scalar(-mean));
     let (design, target) = test;
-    let left = (&target - standard(&design) * weights).norm_squared();
+    let left = (target.add_scalar(-mean) - standard(&design) * weights).norm_squared();
     let whole = target.norm_squared();
     if whole > 0.0 { (1.0 - left / whole).max(0.0) } else { 0.0 }
 }

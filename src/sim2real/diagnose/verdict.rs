@@ -22,6 +22,8 @@ const DEPENDENT: f64 = 8.0;
 const FORETOLD: f64 = 0.10;
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
 const AT_THE_NOISE: f64 = 1.5;
+/// With fewer rows than this, what is not explained is not called explained either.
+const FEWEST_ROWS: usize = 50;
 /// A name less certain than this is ambiguous.
 const CERTAIN: f64 = 0.7;
 
@@ -62,7 +64,8 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
 
 /// What the remaining residuals of messages depend on most.
 pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
-    if inquiry.twin.clock() != Clock::Event {
+    // Below the noise there is nothing to explain, however regular it is: rounding of the arithmetic is regular too.
+    if inquiry.twin.clock() != Clock::Event || at_the_noise(selected) {
         return None;
     }
     let parts = &inquiry.evidence.compared;
@@ -151,11 +154,20 @@ fn structured(findings: &Findings) -> bool {
     findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
 }
 
+/// Whether what is left is no more than the noise.
+fn at_the_noise<T>(hypothesis: &Hypothesis<T>) -> bool {
+    hypothesis.misfits.iter().all(|m| m.sum_of_squares <= AT_THE_NOISE * m.count as f64)
+}
+
 fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
-    let at_the_noise = selection.selected.misfits.iter().all(|m| m.sum_of_squares <= AT_THE_NOISE * m.count as f64);
-    let left_over = structured(findings) && !at_the_noise;
+    let left_over = structured(findings) && !at_the_noise(&selection.selected);
     if effects.is_empty() {
-        return if left_over { Verdict::Unexplained } else { Verdict::NoMismatch };
+        let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
+        return match left_over {
+            true => Verdict::Unexplained,
+            false if rows < FEWEST_ROWS && !at_the_noise(&selection.selected) => Verdict::NotExcited,
+            false => Verdict::NoMismatch,
+        };
     }
     // What fits the past and not the future was never excited enough to be told.
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
@@ -247,7 +259,7 @@ fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> Vec<String> 
             "what is left depends most on {} (-log10 p = {:.1}; above {DEPENDENT} it counts)",
             dependence.on, dependence.strength
         ));
-    } else {
+    } else if inquiry.twin.clock() != Clock::Event {
         notes.push(format!(
             "a regression on the motion foretells {:.1} % of what is left on held-out data (above {:.0} % it counts)",
             100.0 * findings.foretold,
@@ -283,7 +295,7 @@ fn summary<T: Twin>(inquiry: &Inquiry<'_, T>, verdict: Verdict, effects: &[Effec
         )
     });
     match verdict {
-        Verdict::Named => format!("The {name} leaves out {names}: with it modelled, {gained}."),
+        Verdict::Named => format!("The {name} leaves out {names}: with that modelled, {gained}."),
         Verdict::Ambiguous => {
             let rivals: Vec<String> = effects.iter().flat_map(|e| e.rivals.iter()).map(|r| title(&r.mechanism)).collect();
             format!("The {name} leaves out {names}, or {} instead: these data do not tell; {gained}.", listed(&rivals))
@@ -291,6 +303,9 @@ fn summary<T: Twin>(inquiry: &Inquiry<'_, T>, verdict: Verdict, effects: &[Effec
         Verdict::NoMismatch => format!(
             "The {name} explains the recordings once its own parameters are refitted: nothing is missing that these data show."
         ),
+        Verdict::NotExcited if effects.is_empty() => {
+            format!("The {name} does not explain the recordings, and they are too few to tell what is missing: record more.")
+        }
         Verdict::NotExcited => format!(
             "{names} would explain the fitted data but not those held out: these recordings do not move the {name} enough to tell."
         ),

@@ -162,6 +162,17 @@ fn jacobian_with_priors<S: Simulator>(problem: &Problem<'_, S>, free: &[usize], 
     out
 }
 
+/// Number of directions in which the columns reach, to within [`RANK_TOLERANCE`] of the longest reach.
+fn rank(columns: &DMatrix<f64>) -> usize {
+    // Of nothing there are no singular values to ask for.
+    if columns.is_empty() {
+        return 0;
+    }
+    let singular = columns.singular_values();
+    let strongest = singular.iter().copied().fold(0.0, f64::max);
+    singular.iter().filter(|s| **s > RANK_TOLERANCE * strongest && **s > 0.0).count()
+}
+
 /// Residuals, derivatives and their consequences at the solution.
 fn describe<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usize], state: State) -> Fit {
     let evaluation = problem.evaluate(&theta, &state, free);
@@ -169,16 +180,14 @@ fn describe<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usi
     let scales: Vec<f64> = free.iter().map(|k| parameters[*k].scale()).collect();
     let mut scaled = evaluation.jacobian.clone();
     scaled.column_iter_mut().zip(&scales).for_each(|(mut column, scale)| column *= *scale);
-    let singular = scaled.clone().singular_values();
-    let strongest = singular.iter().copied().fold(0.0, f64::max);
-    let rank = singular.iter().filter(|s| **s > RANK_TOLERANCE * strongest && **s > 0.0).count();
+    let rank = rank(&scaled);
 
     let mut information = scaled.tr_mul(&scaled);
     for (i, k) in free.iter().enumerate() {
         information[(i, i)] += (prior_weight(problem, *k) * scales[i]).powi(2);
     }
     let mut std = vec![0.0; theta.len()];
-    let covariance = information.try_inverse();
+    let covariance = if free.is_empty() { None } else { information.try_inverse() };
     for (i, k) in free.iter().enumerate() {
         let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]);
         std[*k] = if variance >= 0.0 { variance.sqrt() * scales[i] } else { f64::INFINITY };

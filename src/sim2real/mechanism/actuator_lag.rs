@@ -1,10 +1,11 @@
-//! An actuator that follows its command with a first-order lag.
+//! An actuator that follows its command with a lag.
 
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
-/// `time_constant du/dt = u_command - u`.
+/// `time_constant du/dt = u_command - u`; in the form `two_stage`, two such lags of half of `total_time` each, one after the
+/// other: a filter, then a winding.
 ///
-/// Solved exactly over each tick for a command that holds; what the plant gets is the mean over the tick.
+/// Each stage is solved exactly over a tick for a command that holds; what the next gets is the mean over the tick.
 ///
 /// Source: first-order actuator, Åström & Murray, *Feedback Systems* (2nd ed. 2021), section 3.3.
 #[derive(Debug, Clone, Copy)]
@@ -18,8 +19,8 @@ where
         About {
             name: "actuator_lag",
             site: Site::Command,
-            title: "a first-order lag of the actuator",
-            law: "time_constant du/dt = u_command - u",
+            title: "a lag of the actuator",
+            law: "time_constant du/dt = u_command - u; two_stage: twice, with half of total_time each",
             source: "Åström & Murray, Feedback Systems (2021), 3.3",
             remedy: "measure the actuator's step response; add the lag to the simulator",
             contains: &[],
@@ -27,18 +28,24 @@ where
     }
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
-        Form::only(vec![Parameter::new("time_constant", "s", 0.0).within(0.0, 2.0).starting_at(&[0.01, 0.05])])
+        let time = |name| Parameter::new(name, "s", 0.0).within(0.0, 2.0).starting_at(&[0.01, 0.05]);
+        vec![
+            Form { name: "first_order", parameters: vec![time("time_constant")] },
+            Form { name: "two_stage", parameters: vec![time("total_time")] },
+        ]
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Lag {
-            time_constant: thetas.row(0).to_vec(),
-            follower: vec![None; thetas.lanes()],
-            decay: Decay::default(),
-        })
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let stages = form + 1;
+        let time_constant: Vec<f64> = thetas.row(0).iter().map(|time| time / stages as f64).collect();
+        Box::new(Lags(vec![Lag { time_constant, follower: vec![None; thetas.lanes()], decay: Decay::default() }; stages]))
     }
 }
 
+/// The stages, in the order in which a command passes them.
+struct Lags(Vec<Lag>);
+
+#[derive(Clone)]
 struct Lag {
     time_constant: Vec<f64>,
     /// What the actuator gives at the start of the tick; none before the first command, which it has already reached.
@@ -48,7 +55,7 @@ struct Lag {
 
 /// `1 - exp(-step / time_constant)` over lanes, kept while the step stays the same: an exponential costs more than
 /// all the rest of the law.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Decay {
     step: f64,
     gained: Vec<f64>,
@@ -64,11 +71,17 @@ impl Decay {
     }
 }
 
-impl<P: Plant> Law<P> for Lag
+impl<P: Plant> Law<P> for Lags
 where
     P::Command: AsMut<f64>,
 {
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
+        self.0.iter_mut().for_each(|lag| lag.pass(tick, commands));
+    }
+}
+
+impl Lag {
+    fn pass<C: AsMut<f64>>(&mut self, tick: Tick, commands: &mut [C]) {
         let gained = self.decay.over(tick.step, &self.time_constant);
         let lanes = commands.iter_mut().zip(&self.time_constant).zip(&mut self.follower).zip(gained);
         for (((command, tau), follower), gained) in lanes {

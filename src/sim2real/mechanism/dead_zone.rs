@@ -2,7 +2,8 @@
 
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
-/// `u -> 0` where `|u| <= width`, `u - sign(u) width` elsewhere.
+/// `u -> 0` where `|u| <= width`, `u - sign(u) width` elsewhere; in the form `soft`, `u -> u - u / sqrt(1 + (u / soft_width)^2)`,
+/// as where several small gaps, or a driver's crossover, add up.
 ///
 /// Source: Tao & Kokotović, *Adaptive Control of Systems with Actuator and Sensor Nonlinearities* (1996), chapter 2.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +18,7 @@ where
             name: "dead_zone",
             site: Site::Command,
             title: "a dead zone of the actuator",
-            law: "u -> sign(u) max(|u| - width, 0)",
+            law: "u -> sign(u) max(|u| - width, 0); soft: u -> u - u / sqrt(1 + (u / soft_width)^2)",
             source: "Tao & Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996), ch. 2",
             remedy: "raise small commands above the dead zone, or add it to the simulator",
             contains: &[],
@@ -26,11 +27,16 @@ where
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.02, 0.1, 0.3].map(|fraction| fraction * typical.command);
-        Form::only(vec![Parameter::new("width", "command", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)])
+        let width = |name| Parameter::new(name, "command", 0.0).within(0.0, f64::INFINITY).starting_at(&starts);
+        vec![
+            Form { name: "hard", parameters: vec![width("width")] },
+            Form { name: "soft", parameters: vec![width("soft_width")] },
+        ]
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Width(thetas.row(0).to_vec()))
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let widths = thetas.row(0).to_vec();
+        if form == 0 { Box::new(Width(widths)) } else { Box::new(SoftWidth(widths)) }
     }
 }
 
@@ -45,6 +51,22 @@ where
             let u = command.as_mut();
             if *width > 0.0 {
                 *u = u.signum() * (u.abs() - width).max(0.0);
+            }
+        }
+    }
+}
+
+struct SoftWidth(Vec<f64>);
+
+impl<P: Plant> Law<P> for SoftWidth
+where
+    P::Command: AsMut<f64>,
+{
+    fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
+        for (command, width) in commands.iter_mut().zip(&self.0) {
+            let u = command.as_mut();
+            if *width > 0.0 {
+                *u -= *u / (*u / width).hypot(1.0);
             }
         }
     }

@@ -2,7 +2,8 @@
 
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
-/// `u -> min(max(u, -limit), limit)`.
+/// `u -> min(max(u, -limit), limit)`, or, in the form `soft`, `u -> u / sqrt(1 + (u / soft_limit)^2)`: an amplifier that
+/// runs into its supply voltage gives way before it stops.
 ///
 /// Source: Tarbouriech et al., *Stability and Stabilization of Linear Systems with Saturating Actuators* (2011),
 /// chapter 1.
@@ -18,7 +19,7 @@ where
             name: "saturation",
             site: Site::Command,
             title: "saturation of the actuator",
-            law: "u -> min(max(u, -limit), limit)",
+            law: "u -> min(max(u, -limit), limit); soft: u -> u / sqrt(1 + (u / soft_limit)^2)",
             source: "Tarbouriech et al., Stability and Stabilization of Linear Systems with Saturating Actuators (2011)",
             remedy: "keep commands within the limit, or clip them in the simulator as the actuator does",
             contains: &[],
@@ -27,11 +28,16 @@ where
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [1.6, 1.2, 0.8, 0.5].map(|fraction| fraction * typical.command);
-        Form::only(vec![Parameter::new("limit", "command", f64::INFINITY).within(0.0, f64::INFINITY).starting_at(&starts)])
+        let limit = |name| Parameter::new(name, "command", f64::INFINITY).within(0.0, f64::INFINITY).starting_at(&starts);
+        vec![
+            Form { name: "hard", parameters: vec![limit("limit")] },
+            Form { name: "soft", parameters: vec![limit("soft_limit")] },
+        ]
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Limit(thetas.row(0).to_vec()))
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let limits = thetas.row(0).to_vec();
+        if form == 0 { Box::new(Limit(limits)) } else { Box::new(SoftLimit(limits)) }
     }
 }
 
@@ -45,6 +51,20 @@ where
         for (command, limit) in commands.iter_mut().zip(&self.0) {
             let u = command.as_mut();
             *u = u.max(-limit).min(*limit);
+        }
+    }
+}
+
+struct SoftLimit(Vec<f64>);
+
+impl<P: Plant> Law<P> for SoftLimit
+where
+    P::Command: AsMut<f64>,
+{
+    fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
+        for (command, limit) in commands.iter_mut().zip(&self.0) {
+            let u = command.as_mut();
+            *u = if *limit > 0.0 { *u / (*u / limit).hypot(1.0) } else { 0.0 };
         }
     }
 }
