@@ -150,10 +150,8 @@ fn costs(ran: &Ran) -> Vec<Cost> {
 fn in_force(ran: &Ran) -> Vec<InForce> {
     let venue = ran.backtest.venue();
     let mechanism = |(name, parameters): (&str, &[crate::sim2real::Parameter])| {
-        let settings: Vec<String> = parameters
-            .iter()
-            .map(|p| with_unit(&format!("{} = {}", p.name, significant(p.nominal, 6)), &venue.unit(&p.unit)))
-            .collect();
+        let settings: Vec<String> =
+            parameters.iter().map(|p| with_unit(&format!("{} = {}", p.name, p.nominal), &venue.unit(&p.unit))).collect();
         InForce { name: name.to_owned(), setting: settings.join(", ") }
     };
     let mut all: Vec<InForce> = venue.mechanisms().map(|(row, _, p)| mechanism((row.about().name, p))).collect();
