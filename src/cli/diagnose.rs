@@ -41,6 +41,9 @@ pub(super) struct Diagnose {
     /// Recordings for proof alone, which no fit sees [default: the last 30 % in time of each recording]
     #[arg(long, value_name = "PATH", num_args = 1..)]
     holdout: Vec<PathBuf>,
+    /// Mechanisms to leave out of the registry: what is said without the right one shows what an answer is worth
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    without: Vec<String>,
     /// Folder to write diagnosis.json, trued.toml and report.html into
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -89,7 +92,7 @@ pub(super) const FILES: [&str; 3] = ["diagnosis.json", "trued.toml", "report.htm
 impl Diagnose {
     pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
         let file = TwinFile::read(&self.twin)?;
-        let case = Case::read(&file, &self.recording, &self.holdout)?;
+        let case = Case::read(&file, &self.recording, &self.holdout)?.without(&self.without)?;
         let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
         if let Some(folder) = &self.out {
             // Before the work rather than after it.
@@ -126,10 +129,12 @@ pub(super) fn write(
 ) -> Result<Vec<PathBuf>, Stop> {
     let diagnosis = &diagnosed.diagnosis;
     let page = diagnosis_page(diagnosis, &figures(diagnosed.comparisons))?;
-    let name = file.document().path().file_name().unwrap_or_default().to_string_lossy();
+    let name = file.document().path().file_name().unwrap_or_default().to_string_lossy().replace(char::is_control, " ");
+    // A sentence with line breaks would leave the comment.
+    let summary = diagnosis.summary.replace(char::is_control, " ");
     let trued = format!(
-        "# Made by `trueup diagnose` from {name}. {}\n{}",
-        headline(diagnosis).replace('\n', " "),
+        "# Made by `trueup diagnose` from {name}. {}: {summary}\n{}",
+        diagnosis.verdict,
         diagnosed.trued.document(file).render(folder)
     );
     let mut output = OutputFolder::create(folder, overwrite)?;

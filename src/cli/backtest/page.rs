@@ -4,7 +4,7 @@ use chrono::DateTime;
 
 use crate::market::metric::Sampling;
 use crate::market::{Record, Reference};
-use crate::report::quantity::{UNDEFINED, decimals, number, percent, significant, with_unit};
+use crate::report::quantity::{UNDEFINED, decimals, number, significant, with_unit};
 use crate::report::{BacktestPage, Cost, Exposure, Fill, InForce, Input, Metric};
 use crate::sim2real::{Simulator, Timestamp};
 
@@ -42,6 +42,11 @@ pub(super) fn title(ran: &Ran) -> String {
     let fall =
         metrics.max_drawdown.map_or_else(|| "no loss".to_owned(), |d| format!("a largest loss of {}", percent(d.depth)));
     format!("{} on {}{span}: {gained} after costs, with {fall} on the way.", ran.file.strategy, symbols.join(", "))
+}
+
+/// A part of one as a percentage to a hundredth.
+fn percent(part: f64) -> String {
+    format!("{}\u{a0}%", decimals(100.0 * part, 2))
 }
 
 /// The key figures.
@@ -145,10 +150,8 @@ fn costs(ran: &Ran) -> Vec<Cost> {
 fn in_force(ran: &Ran) -> Vec<InForce> {
     let venue = ran.backtest.venue();
     let mechanism = |(name, parameters): (&str, &[crate::sim2real::Parameter])| {
-        let settings: Vec<String> = parameters
-            .iter()
-            .map(|p| with_unit(&format!("{} = {}", p.name, significant(p.nominal, 6)), &venue.unit(&p.unit)))
-            .collect();
+        let settings: Vec<String> =
+            parameters.iter().map(|p| with_unit(&format!("{} = {}", p.name, p.nominal), &venue.unit(&p.unit))).collect();
         InForce { name: name.to_owned(), setting: settings.join(", ") }
     };
     let mut all: Vec<InForce> = venue.mechanisms().map(|(row, _, p)| mechanism((row.about().name, p))).collect();

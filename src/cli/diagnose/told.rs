@@ -12,13 +12,13 @@ use crate::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, Score};
 const RANKED: usize = 6;
 
 /// The verdict and its sentence.
-pub(in crate::cli) fn headline(diagnosis: &Diagnosis) -> String {
-    format!("{}: {}", diagnosis.verdict, diagnosis.summary)
+pub(in crate::cli) fn headline(screen: &Screen, diagnosis: &Diagnosis) -> String {
+    screen.wrapped(&format!("{}: ", diagnosis.verdict), &diagnosis.summary)
 }
 
 /// Everything a person wants to read of a diagnosis, most important first.
 pub(super) fn diagnosis(screen: &Screen, diagnosis: &Diagnosis) -> String {
-    let mut text = format!("{}\n", screen.wrapped(&headline(diagnosis), 2));
+    let mut text = format!("{}\n", headline(screen, diagnosis));
     if !diagnosis.effects.is_empty() {
         text += &titled("What is missing", &effects(screen, &diagnosis.effects));
     }
@@ -62,8 +62,7 @@ fn effects(screen: &Screen, effects: &[Effect]) -> Table {
 
 /// Errors of the three twins, two rows a channel.
 pub(in crate::cli) fn errors(screen: &Screen, fits: &[ChannelFit]) -> Table {
-    let heads =
-        ["channel", "error", ">as given", ">recalibrated", ">trued", ">noise floor", ">improvement over recalibrated, 95 %"];
+    let heads = ["channel", "error", ">as given", ">recalibrated", ">trued", ">noise floor", ">improvement (95 %)"];
     let mut table = screen.table(heads);
     for fit in fits {
         let [low, high] = fit.improvement_ci95;
@@ -144,10 +143,10 @@ fn checks(screen: &Screen, diagnosis: &Diagnosis) -> String {
         text += &format!("  at a bound: {}\n", checks.at_bound.join(", "));
     }
     for note in &checks.notes {
-        text += &format!("{}\n", screen.wrapped(&format!("  - {note}"), 4));
+        text += &format!("{}\n", screen.wrapped("  - ", note));
     }
     if let Some(next) = &diagnosis.next_experiment {
-        text += &format!("\n{}\n", screen.wrapped(&format!("Next experiment: {}.", next.what), 2));
+        text += &format!("\n{}\n", screen.wrapped("Next experiment: ", &next.what));
     }
     text
 }
