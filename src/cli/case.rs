@@ -64,6 +64,17 @@ impl Case {
         }
     }
 
+    /// The same case, in which the mechanisms of these ids are not known.
+    ///
+    /// # Errors
+    /// An id the registry of the twin's domain does not have either.
+    pub fn without(self, ids: &[String]) -> Result<Self, InputError> {
+        Ok(match self {
+            Self::Joint(given) => Self::Joint(given.without(ids)?),
+            Self::Execution(given) => Self::Execution(given.without(ids)?),
+        })
+    }
+
     /// Finds what the twin leaves out.
     pub fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
         match self {
@@ -91,6 +102,15 @@ impl Case {
 }
 
 impl<P: Plant> Given<P> {
+    fn without(self, ids: &[String]) -> Result<Self, InputError> {
+        let known: Vec<&str> = self.twin.registry().iter().map(|mechanism| mechanism.about().name).collect();
+        if let Some(unknown) = ids.iter().find(|id| !known.contains(&id.as_str())) {
+            let error = InputError::new("--without", format!("there is no mechanism `{unknown}`"));
+            return Err(error.maybe_hint(hint_among(unknown, &known)));
+        }
+        Ok(Self { twin: self.twin.excluding(ids), ..self })
+    }
+
     fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
         let tell = |step: &str, done: usize, of: usize| progress.tell(step, done, of);
         let outcome = diagnose(&self.twin, &self.recordings, &self.held_out, seed, &tell);

@@ -41,6 +41,9 @@ pub(super) struct Diagnose {
     /// Recordings for proof alone, which no fit sees [default: the last 30 % in time of each recording]
     #[arg(long, value_name = "PATH", num_args = 1..)]
     holdout: Vec<PathBuf>,
+    /// Mechanisms to leave out of the registry: what is said without the right one shows what an answer is worth
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    without: Vec<String>,
     /// Folder to write diagnosis.json, trued.toml and report.html into
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -89,7 +92,7 @@ pub(super) const FILES: [&str; 3] = ["diagnosis.json", "trued.toml", "report.htm
 impl Diagnose {
     pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
         let file = TwinFile::read(&self.twin)?;
-        let case = Case::read(&file, &self.recording, &self.holdout)?;
+        let case = Case::read(&file, &self.recording, &self.holdout)?.without(&self.without)?;
         let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
         if let Some(folder) = &self.out {
             // Before the work rather than after it.

@@ -62,8 +62,7 @@ fn effects(screen: &Screen, effects: &[Effect]) -> Table {
 
 /// Errors of the three twins, two rows a channel.
 pub(in crate::cli) fn errors(screen: &Screen, fits: &[ChannelFit]) -> Table {
-    let heads =
-        ["channel", "error", ">as given", ">recalibrated", ">trued", ">noise floor", ">improvement over recalibrated, 95 %"];
+    let heads = ["channel", "error", ">as given", ">recalibrated", ">trued", ">noise floor", ">improvement (95 %)"];
     let mut table = screen.table(heads);
     for fit in fits {
         let [low, high] = fit.improvement_ci95;
