@@ -44,9 +44,9 @@ fn title(summary: &RunSummary, backtest: &Backtest, record: &Record) -> String {
     format!("{} on {}{span}: {gained} after costs, with {fall} on the way.", summary.provenance.strategy, symbols.join(", "))
 }
 
-/// A part of one as a percentage, small ones to two places: a day's return is not "1 %".
+/// A part of one as a percentage to a hundredth.
 fn fine(part: f64) -> String {
-    if part.is_finite() && part.abs() < 0.1 { format!("{}\u{a0}%", decimals(100.0 * part, 2)) } else { percent(part) }
+    format!("{}\u{a0}%", decimals(100.0 * part, 2))
 }
 
 fn metrics(summary: &RunSummary) -> Vec<Metric> {
@@ -153,12 +153,16 @@ fn costs(metrics: &Metrics) -> Vec<Cost> {
 
 fn in_force(summary: &RunSummary, backtest: &Backtest) -> Vec<InForce> {
     let venue = backtest.venue();
-    let mechanism = |name: &str, parameters: &[Parameter]| {
-        let settings: Vec<String> = parameters
-            .iter()
-            .map(|p| with_unit(&format!("{} = {}", p.name, significant(p.nominal, 6)), &venue.unit(&p.unit)))
-            .collect();
-        InForce { name: name.to_owned(), setting: settings.join(", ") }
+    let currency = &summary.provenance.currency;
+    let setting = |p: &Parameter| {
+        let unit = venue.unit(&p.unit).replace("currency", currency);
+        let value = format!("{} = {}", p.name, p.nominal);
+        // "bps = 1 bps" says it twice.
+        if unit == p.name.as_ref() { value } else { with_unit(&value, &unit) }
+    };
+    let mechanism = |name: &str, parameters: &[Parameter]| InForce {
+        name: name.to_owned(),
+        setting: parameters.iter().map(setting).collect::<Vec<_>>().join(", "),
     };
     let mut all: Vec<InForce> = venue.mechanisms().map(|(row, _, p)| mechanism(row.about().name, p)).collect();
     let histories = backtest.histories();
