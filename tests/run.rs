@@ -11,8 +11,8 @@ use trueup::conceal::Column;
 use trueup::conceal::exchange::Exchange;
 use trueup::io::{OutputFolder, OutputTable, Overwrite, RunFile, Table, TimeFormat, TwinFile, Values, write_table};
 use trueup::market::{
-    Backtest, EventKind, OrderLog, Orders, PreparedRun, Quantity, Record, RunOutputs, Side, Strategy, View, execution_twin, explained,
-    prepare_run,
+    Backtest, EventKind, OrderLog, Orders, PreparedRun, Quantity, Record, RunOutputs, Side, Strategy, View, execution_twin,
+    explained, prepare_run,
 };
 use trueup::sim2real::diagnose::{Verdict, diagnose};
 use trueup::sim2real::{Recording, Seed, Simulator, Thetas, Timestamp};
@@ -160,7 +160,6 @@ fn a_diagnosis_of_a_backtest_names_what_the_run_modelled() {
     let twin = TwinFile::read(scene.path("twin.toml")).unwrap();
     let (assembly, recordings) = execution_twin(&twin, &[scene.path("out")]).unwrap();
     assert!(worst(&prepared.backtest, &recordings[0]) < 1e-6, "what ran and what is diagnosed are not the same venue");
-    if let Some(keep) = option_env!("KEEP") { for f in ["twin.toml","quotes.parquet"] { std::fs::copy(scene.path(f), format!("{keep}/{f}")).unwrap(); } for f in RunOutputs::FILES { std::fs::copy(scene.path("out").join(f), format!("{keep}/out/{f}")).unwrap(); } }
     let found = diagnose(&assembly, &recordings, &[], Seed(1), &|_, _, _| {}).diagnosis;
     let mut named: Vec<&str> = found.effects.iter().map(|effect| effect.mechanism.as_str()).collect();
     named.sort_unstable();

@@ -42,7 +42,6 @@ impl DataTime {
 
 /// The instant shown at `place` [s since the Unix epoch], where `cuts` were made.
 pub(super) fn instant(place: f64, cuts: &[Cut]) -> f64 {
-    // Within a cut it is still the time before: ticks there would stand for days of which there are no data.
     let cut = cuts.iter().rev().find(|cut| place >= cut.around.1);
     place + cut.map_or(0.0, |cut| cut.removed)
 }

@@ -217,6 +217,9 @@ impl Plot<'_> {
         theme.grid_color = "var(--grid)".into();
         theme.text_color = "var(--soft)".into();
         let x_step = round_step((x.1 - x.0) / (width / 95.0).max(2.0));
+        // Dates with their years are wide, and the last may stand at the very end.
+        let cut = matches!(&self.scale, Scale::Date(cuts) if !cuts.is_empty());
+        let margin_right = if cut { 38.0 } else { 12.0 };
         let mut layout = Layout::new(x, y)
             .with_width(width)
             .with_height(height)
@@ -227,7 +230,7 @@ impl Plot<'_> {
             .with_y_axis_max(y.1)
             .with_y_tick_step(round_step((y.1 - y.0) / ((height - 60.0) / 36.0).max(2.0)))
             // The same margins everywhere, so that plots of the same time stand exactly below each other.
-            .with_force_margins(MARGIN_LEFT, 12.0)
+            .with_force_margins(MARGIN_LEFT, margin_right)
             .with_force_margins_y(8.0, if self.x_label.is_empty() { 26.0 } else { 46.0 })
             .with_x_label(plain(&self.x_label))
             .with_y_label(plain(&self.y_label))
@@ -243,7 +246,11 @@ impl Plot<'_> {
                 let (_, seconds) = date_axis(x.1 - x.0, width / 100.0);
                 let step = (seconds / DAY).round().max(1.0) * DAY;
                 let cuts = cuts.clone();
-                let date = move |place: f64| date(instant(place, &cuts));
+                // Within a cut there is nothing to date.
+                let date = move |place: f64| {
+                    let cut = cuts.iter().any(|cut| place > cut.around.0 && place < cut.around.1);
+                    if cut { String::new() } else { date(instant(place, &cuts)) }
+                };
                 layout.with_x_tick_step(step).with_x_tick_format(TickFormat::Custom(std::sync::Arc::new(date)))
             }
         };
