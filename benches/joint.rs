@@ -1,6 +1,6 @@
 //! What a tick of a joint costs: with 0, 3 and 6 mechanisms, over 1 and 16 lanes. The reference in the same run is the bare
 //! equation of motion in a loop of its own.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::expect_used, reason = "a bench has no users, and ends where the registry lacks a row")]
 
 use std::hint::black_box;
 

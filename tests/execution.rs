@@ -1,4 +1,5 @@
 //! The execution plant and its mechanisms on a log in which everything is known.
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
 //! Execution twins and order logs read from files: what is found in them, and what is said of bad ones.
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -31,7 +31,7 @@ pub fn check_plant<P: Plant>(plant: &P, registry: Registry<P>, recording: &Recor
     let assembly = Assembly::new(plant.clone(), registry);
     check_parameters(plant.name(), &plant.parameters())?;
     let lane = start(&assembly, recording, &[]);
-    let alone = follow(&assembly, recording, &[lane.clone()]);
+    let alone = follow(&assembly, recording, std::slice::from_ref(&lane));
     let names: Vec<&str> = alone[0].iter().map(|s| s.channel.as_str()).collect();
     if names != plant.channels().iter().map(|c| c.name).collect::<Vec<_>>() {
         return fail(format!("channels are {names:?}"));
@@ -39,7 +39,7 @@ pub fn check_plant<P: Plant>(plant: &P, registry: Registry<P>, recording: &Recor
     if alone[0].iter().any(|s| s.samples.len() != recording.len()) {
         return fail("a channel does not have one sample a row".into());
     }
-    if follow(&assembly, recording, &[lane.clone()]) != alone {
+    if follow(&assembly, recording, std::slice::from_ref(&lane)) != alone {
         return fail("two runs differ".into());
     }
     lanes_are_independent(plant.name(), &assembly, recording, &lane)
@@ -84,7 +84,7 @@ pub fn check_mechanism<P: Plant>(
         }
         let acting: Vec<f64> = form.parameters.iter().map(|p| *p.starts.last().unwrap_or(&p.nominal)).collect();
         let lane = start(&with, recording, &acting);
-        let changed = follow(&with, recording, &[lane.clone()]);
+        let changed = follow(&with, recording, std::slice::from_ref(&lane));
         if changed == without {
             return fail(format!("form `{}` changes nothing at its start {acting:?}", form.name));
         }

@@ -1,10 +1,10 @@
 //! Locate, name, model, prove: what a simulator left out, found from recordings.
 //!
-//! One file a step, in this order: [`evidence`] divides the recordings and finds their [`noise`]; a [`hypothesis`] is the
-//! twin with mechanisms added, and the first of them, with none, its own parameters refitted; [`screen`] ranks mechanisms
-//! by their signatures; [`select`] fits and compares sets of them, by the evidence that [`whiteness`] counts; [`rivals`]
-//! looks for other names; [`structure`] asks what is left; [`prove`] measures errors on what was held out; [`locate`]
-//! says where; [`verdict`] puts it into words.
+//! One file a step, in this order: `evidence` divides the recordings and finds their `noise`; a `hypothesis` is the
+//! twin with mechanisms added, and the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
+//! by their signatures; `select` fits and compares sets of them, by the evidence that `whiteness` counts; `rivals`
+//! looks for other names; `structure` asks what is left; `prove` measures errors on what was held out; `locate`
+//! says where; `verdict` puts it into words.
 
 mod diagnosis;
 mod evidence;
