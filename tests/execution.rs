@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use trueup::market::{
-    Execution, Instrument, Level, LogError, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog, OrderType,
-    PriceAssumption, Print, Quotes, Side, Tape, TapeBar,
+    Bar, Execution, Instrument, Level, LogError, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog, OrderType,
+    PriceAssumption, Price, Print, Quotes, Side, Tape,
 };
 use trueup::sim2real::{
     Assembly, Candidate, Plant, Recording, Seed, Simulator, Thetas, Timestamp, Twin, check_mechanism, check_plant,
@@ -127,12 +127,10 @@ fn full() -> Recording<OrderLog> {
 
 /// The same orders on a tape of bars of ten seconds.
 fn on_bars(price: PriceAssumption) -> Recording<OrderLog> {
-    let bar = |k: i64| TapeBar {
-        open_at: at(10 * k),
-        known_at: at(10 * k + 10),
-        open: mid(10 * k),
-        close: mid(10 * k + 9),
-        volume: 400.0,
+    let bar = |k: i64| {
+        let [open, close] = [mid(10 * k), mid(10 * k + 9)].map(|price| Price::nearest(price).unwrap());
+        let (high, low) = (open.max(close), open.min(close));
+        Bar { open_at: at(10 * k), known_at: at(10 * k + 10), open, high, low, close, volume: 400.0 }
     };
     log(Tape::new(Quotes::default(), Vec::new(), (-1..ORDERS + 1).map(bar).collect()), price, &orders(), &fills()).unwrap()
 }

@@ -1,22 +1,16 @@
 //! `trueup backtest`: a strategy on past data.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::io::{InputError, OutputFolder, Overwrite, RunFile, hint_among};
-use crate::market::{
-    Backtest, InputHash, Provenance, Record, Reference, RunSetUp, RunSummary, Session, Strategy, explained,
-};
-use crate::sim2real::Twin;
-use crate::strategies::{self, StrategyError};
+use crate::io::{InputError, OutputFolder, Overwrite, RunFile};
+use crate::market::{Backtest, Record, RunOutputs, Session, Strategy, explained, prepare_run};
+use crate::report::quantity::UNDEFINED;
+use crate::strategies;
 
 use super::screen::{Progress, Screen};
 use super::stop::{Outcome, Stop};
-
-mod page;
-
-use page::{metrics, title};
 
 /// Run a strategy on past bars or quotes, event by event
 ///
@@ -44,39 +38,25 @@ pub(super) struct Run {
     seed: Option<u64>,
 }
 
-const FILES: [&str; 5] = ["run.json", "orders.parquet", "fills.parquet", "equity.parquet", "report.html"];
-
-/// A backtest that has been run.
-struct Ran {
-    file: RunFile,
-    backtest: Backtest,
-    /// Rows of each data file.
-    rows: Vec<usize>,
-    strategy: String,
-    record: Record,
-    summary: RunSummary,
-}
-
 impl Run {
     pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
         let mut file = RunFile::read(&self.run)?;
         file.run.seed = self.seed.unwrap_or(file.run.seed);
         let mut strategy = strategy(&file)?;
-        let RunSetUp { backtest, rows } = RunSetUp::of(&file)?;
         let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
         if let Some(folder) = &self.out {
-            OutputFolder::create(folder, overwrite)?.check_free(&FILES)?;
+            OutputFolder::create(folder, overwrite)?.check_free(&RunOutputs::FILES)?;
         }
-        let record = run(&backtest, strategy.as_mut(), &screen.progress()).map_err(|error| explained(&file, &error))?;
-        let provenance = provenance(&file, &backtest)?;
-        let summary = RunSummary::new(provenance, &record, backtest.instruments());
-        let summary = summary.map_err(|error| Stop::Bug(error.to_string()))?;
-        let strategy = strategy.name().to_owned();
-        let ran = Ran { file, backtest, rows, strategy, record, summary };
-        let mut text = if self.json { ran.json()? } else { ran.told(screen) };
+        let prepared = prepare_run(&file)?;
+        let record = run(&prepared.backtest, strategy.as_mut(), &screen.progress());
+        let record = record.map_err(|error| explained(&file, &error))?;
+        let outputs = prepared.outputs(&record).map_err(|error| Stop::Bug(error.to_string()))?;
+        let mut text = if self.json { outputs.json()? } else { told(&outputs, screen) };
         match &self.out {
             Some(folder) => {
-                let paths = ran.write(folder, overwrite)?;
+                let mut output = OutputFolder::create(folder, overwrite)?;
+                outputs.write(&mut output)?;
+                let paths = output.finish()?;
                 if !self.json {
                     text += "\n";
                     paths.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
@@ -94,27 +74,12 @@ impl Run {
 fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
     let mut table: toml::Table = file.strategy_settings()?;
     table.insert("kind".to_owned(), toml::Value::String(file.strategy.clone()));
-    strategies::build(&table).map_err(|error| explained_strategy(file, &error))
-}
-
-/// The error of a strategy at its place in the run.
-fn explained_strategy(file: &RunFile, error: &StrategyError) -> InputError {
-    let text = error.to_string();
-    let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
-    let message = message.trim_start_matches("[strategy] ");
-    match error {
-        StrategyError::NoKind(_) | StrategyError::Unknown { .. } => file.error(&["strategy", "kind"], message).hint(hint),
-        StrategyError::Value { parameter, .. } => file.error(&["strategy", parameter], message).hint(hint),
-        StrategyError::Parameter { kind, message, parameters } => {
-            let word = message.split('`').nth(1).unwrap_or_default();
-            let known: Vec<&str> = parameters.split(", ").collect();
-            if message.starts_with("unknown field") {
-                let error = file.error(&["strategy", word], format!("`{kind}` has no parameter `{word}`"));
-                return error.maybe_hint(hint_among(word, &known));
-            }
-            file.error(&["strategy", word], format!("{kind}: {message}")).hint(hint)
-        }
-    }
+    strategies::build(&table).map_err(|error| {
+        let text = error.to_string();
+        let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
+        let error = file.error(&["strategy"], message.trim_start_matches("[strategy] "));
+        if hint.is_empty() { error } else { error.hint(hint) }
+    })
 }
 
 /// Events between two looks at the progress.
@@ -137,50 +102,10 @@ fn run(
     }
 }
 
-fn provenance(file: &RunFile, backtest: &Backtest) -> Result<Provenance, Stop> {
-    let folder = file.document().path().parent().unwrap_or(Path::new(""));
-    let hash = |path: &Path, name: String| -> Result<InputHash, Stop> {
-        let bytes = std::fs::read(path).map_err(|error| InputError::new(path, format!("cannot be read ({error})")))?;
-        Ok(InputHash::of(name, &bytes))
-    };
-    let own = file.document().path();
-    let mut inputs = vec![hash(own, own.file_name().unwrap_or_default().to_string_lossy().into_owned())?];
-    for data in &file.data {
-        let name = data.path.strip_prefix(folder).unwrap_or(&data.path).display().to_string();
-        inputs.push(hash(&data.path, name)?);
+fn told(outputs: &RunOutputs, screen: &Screen) -> String {
+    let mut table = screen.table(["figure", ">value"]);
+    for metric in &outputs.page.metrics {
+        table.add_row([metric.name.clone(), metric.value.clone().unwrap_or_else(|| UNDEFINED.to_owned())]);
     }
-    let venue = backtest.venue();
-    Ok(Provenance {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        seed: file.run.seed,
-        currency: file.run.currency.clone(),
-        strategy: file.strategy.clone(),
-        mechanisms: venue.modelled().into_iter().map(str::to_owned).collect(),
-        reference: Reference::suiting(venue),
-        inputs,
-    })
-}
-
-impl Ran {
-    fn json(&self) -> Result<String, Stop> {
-        Ok(format!("{}\n", serde_json::to_string_pretty(&self.summary)?))
-    }
-
-    fn told(&self, screen: &Screen) -> String {
-        let mut table = screen.table(["figure", ">value"]);
-        for metric in metrics(self) {
-            table.add_row([metric.name, metric.value.unwrap_or_else(|| crate::report::quantity::UNDEFINED.to_owned())]);
-        }
-        format!("{}\n\n{}\n", screen.wrapped("", &title(self)), table.trim_fmt())
-    }
-
-    fn write(&self, folder: &Path, overwrite: Overwrite) -> Result<Vec<PathBuf>, Stop> {
-        let mut output = OutputFolder::create(folder, overwrite)?;
-        output.file("run.json", self.json()?.as_bytes())?;
-        output.table("orders.parquet", &self.record.orders_table(self.backtest.instruments(), &self.strategy))?;
-        output.table("fills.parquet", &self.record.fills_table())?;
-        output.table("equity.parquet", &self.record.equity_table())?;
-        output.file("report.html", page::page(self).render()?.as_bytes())?;
-        Ok(output.finish()?)
-    }
+    format!("{}\n\n{}\n", screen.wrapped("", &outputs.page.title), table.trim_fmt())
 }

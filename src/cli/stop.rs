@@ -4,6 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::process::ExitCode;
 
 use crate::io::InputError;
+use crate::market::OutputError;
 use crate::report::ReportError;
 
 /// What a command that came to its end found.
@@ -30,6 +31,16 @@ pub(super) enum Stop {
 impl From<ReportError> for Stop {
     fn from(error: ReportError) -> Self {
         Self::Bug(error.to_string())
+    }
+}
+
+impl From<OutputError> for Stop {
+    fn from(error: OutputError) -> Self {
+        match error {
+            OutputError::File(error) => Self::Input(error),
+            OutputError::Page(error) => error.into(),
+            OutputError::Summary(error) => error.into(),
+        }
     }
 }
 

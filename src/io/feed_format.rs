@@ -2,34 +2,14 @@
 
 use chrono_tz::{TZ_VARIANTS, Tz};
 use serde::de::Error;
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize as _, Deserializer};
 
 use super::document::{Document, HINT};
 use super::error::{InputError, hint_among};
 use super::source::open;
+use super::stamp::Stamp;
 use super::table::Renames;
 use super::time_format::{TimeFormat, TimeUnit};
-
-/// What the time of a bar is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stamp {
-    /// The bar's first instant.
-    Open,
-    /// The instant the bar is complete.
-    Close,
-}
-
-impl Stamp {
-    /// The word for it in documents.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Open => "open",
-            Self::Close => "close",
-        }
-    }
-}
 
 /// How market data files are written.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,11 +13,13 @@ use serde::{Deserialize, Deserializer};
 
 use super::document::{Document, HINT};
 use super::error::{InputError, hint_among};
-use super::feed_format::{FeedFormat, Stamp, check_file, zone};
+use super::feed_format::{FeedFormat, check_file, zone};
 use super::instrument_entry::{InstrumentEntry, check_instruments};
 use super::quantity::{MechanismEntry, check_mechanisms};
+use super::stamp::Stamp;
 use super::table::Renames;
 use super::time_format::TimeUnit;
+use super::twin_file::AssumedPrice;
 use crate::sim2real::Timestamp;
 
 /// A run, as its document declares it.
@@ -48,6 +50,8 @@ pub struct RunSection {
     pub currency: String,
     /// Largest sum of positions over equity; none for 1, which borrows nothing.
     pub max_leverage: Option<f64>,
+    /// The price mechanisms start from; none for what suits them and the data.
+    pub price: Option<AssumedPrice>,
     /// The first instant of data that counts; none for all from the first.
     #[serde(default, deserialize_with = "instant")]
     pub start: Option<Timestamp>,
@@ -91,6 +95,8 @@ pub struct DataEntry {
     pub kind: FeedKind,
     /// The file.
     pub path: PathBuf,
+    /// The file, as the document names it.
+    pub named: String,
     /// How it is written.
     pub format: FeedFormat,
     /// Length of a bar [ns]; none where the distances between bars show it.
@@ -156,6 +162,10 @@ impl RunFile {
         if !run.cash.is_finite() || run.cash < 0.0 {
             let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
             return Err(error.found(run.cash).hint("it is what the run starts with"));
+        }
+        if let Some(leverage) = run.max_leverage.filter(|leverage| !leverage.is_finite() || *leverage <= 0.0) {
+            let error = document.error(&["run", "max_leverage"], "expected a finite number greater than 0");
+            return Err(error.found(leverage).hint("1 borrows nothing; 2 holds positions of up to twice the equity"));
         }
         if let (Some(start), Some(end)) = (run.start, run.end)
             && start >= end
@@ -242,7 +252,7 @@ fn data_entry(
         let error = document.error(&["data", number, "interval"], "only bars have an `interval`");
         return Err(error.hint("drop the key"));
     }
-    Ok(DataEntry { symbol: table.symbol, kind, path: path.into(), format, interval: table.interval })
+    Ok(DataEntry { symbol: table.symbol, kind, path: PathBuf::from(&path), named: path, format, interval: table.interval })
 }
 
 /// Reads the length of a bar [ns]: a whole number and one of s, m, h, d.

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use sha2::{Digest, Sha256};
+
 use super::columnar::Container;
 use super::error::{InputError, did_you_mean};
 
@@ -67,6 +69,24 @@ pub(super) fn bytes(path: &Path, mut file: File) -> Result<Vec<u8>, InputError> 
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).map_err(|error| InputError::new(path, format!("cannot be read ({error})")))?;
     Ok(bytes)
+}
+
+/// SHA-256 of a file's bytes, in hexadecimal digits.
+///
+/// # Errors
+/// A file that is missing, a folder or cannot be read.
+pub fn file_hash(path: impl AsRef<Path>) -> Result<String, InputError> {
+    let path = path.as_ref();
+    let mut file = open(path)?;
+    let mut hash = Sha256::new();
+    let mut piece = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut piece) {
+            Ok(0) => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
+            Ok(count) => hash.update(&piece[..count]),
+            Err(error) => return Err(InputError::new(path, format!("cannot be read ({error})"))),
+        }
+    }
 }
 
 /// All bytes of a file, decompressed.

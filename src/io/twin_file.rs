@@ -9,10 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use super::document::Document;
 use super::error::InputError;
-use super::feed_format::{FeedFormat, Stamp, check_file, zone};
+use super::feed_format::{FeedFormat, check_file, zone};
 use super::instrument_entry::{InstrumentEntry, check_instruments};
 use super::quantity::{MechanismEntry, Quantity, check_mechanisms};
 use super::relative_path::path_from;
+use super::stamp::Stamp;
 use super::table::Renames;
 use super::time_format::TimeUnit;
 use super::unit::check_unit;

@@ -150,6 +150,12 @@ impl Backtest {
         &self.venue
     }
 
+    /// What else it depends on.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// Their data.
     #[must_use]
     pub fn histories(&self) -> &[History] {

@@ -1,5 +1,6 @@
 //! What became of each order: the record a run leaves, in the form of an execution log.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
@@ -146,10 +147,12 @@ pub struct Blotter {
     pub orders: Vec<Order>,
     /// Fills, in the order of time.
     pub fills: Vec<Fill>,
+    /// What each mechanism added to the prices of all fills, by its id: a loss is positive [currency].
+    pub concessions: BTreeMap<&'static str, f64>,
     /// The first orders that were refused, at most [`Blotter::REJECTIONS_KEPT`].
     pub rejections: Vec<Rejection>,
     /// Number of all orders refused, by reason.
-    pub rejected: std::collections::BTreeMap<Reason, usize>,
+    pub rejected: BTreeMap<Reason, usize>,
 }
 
 impl Blotter {

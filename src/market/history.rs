@@ -82,10 +82,22 @@ impl History {
         &self.bars
     }
 
+    /// Its bars alone, oldest first.
+    #[must_use]
+    pub fn into_bars(self) -> Vec<Bar> {
+        self.bars
+    }
+
     /// Its quotes, oldest first.
     #[must_use]
     pub fn quotes(&self) -> &Quotes {
         &self.quotes
+    }
+
+    /// These bars with the quotes of `other`: each was checked when it was made.
+    #[must_use]
+    pub fn with_quotes_of(self, other: Self) -> Self {
+        Self { bars: self.bars, quotes: other.quotes }
     }
 
     /// The same history without what was known before `start` or after `end`.

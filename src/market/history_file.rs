@@ -1,16 +1,18 @@
 //! Bars and quotes from files, held to what bars and quotes can be.
 
-use crate::io::{self, FeedFormat, Increase, InputError, Table, check_increasing, check_not_negative};
+use crate::io::{FeedFormat, Increase, InputError, Table, check_increasing, check_not_negative, common_spacing};
+use crate::sim2real::Timestamp;
 
-use super::{Bar, Book, History, HistoryError, Level, Price, Quotes, Stamp, common_spacing};
+use super::{Bar, Book, History, HistoryError, Level, Price, Quotes};
 
-const BAR_COLUMNS: [&str; 6] = ["ts", "open", "high", "low", "close", "volume"];
+/// The columns of a file of bars.
+pub(super) const BAR_COLUMNS: [&str; 6] = ["ts", "open", "high", "low", "close", "volume"];
 
 impl History {
     /// Reads a file of bars: `ts, open, high, low, close, volume`; files of several days with gaps between are fine.
     ///
     /// A bar is `interval` [ns] long; where that is not declared, as long as the most common distance between two of
-    /// them. It never reaches into the next: see [`Stamp::spans`].
+    /// them. It never reaches into the next: see [`Stamp::spans`](crate::io::Stamp::spans).
     ///
     /// # Errors
     /// What cannot be read; no `stamp`; times that do not increase strictly; prices that are not above 0 or where not
@@ -22,43 +24,7 @@ impl History {
     ) -> Result<Self, InputError> {
         let table = Table::read_with(path, &format.columns)?;
         table.check_renames(&BAR_COLUMNS)?;
-        let stamp = match format.stamp {
-            Some(io::Stamp::Open) => Stamp::Open,
-            Some(io::Stamp::Close) => Stamp::Close,
-            None => {
-                let error = InputError::new(table.path(), "nothing says which end of a bar its time names");
-                return Err(error.hint("add stamp = \"open\" or stamp = \"close\" to [[data]]"));
-            }
-        };
-        let times = table.times("ts", &format.time)?;
-        check_increasing(&table, "ts", &times, Increase::Strictly)?;
-        if let (Some(declared), Some(common)) = (interval, common_spacing(&times))
-            && common < declared
-        {
-            let message =
-                format!("most bars are {} s apart, but `interval` says {} s", common as f64 / 1e9, declared as f64 / 1e9);
-            return Err(InputError::new(table.path(), message).in_column("ts").hint("give the length of one bar"));
-        }
-        let spans = stamp.spans(&times, interval).ok_or_else(|| {
-            let error = InputError::new(table.path(), "one bar alone does not show how long a bar is");
-            error.hint("declare it: interval = \"1m\" in [[data]]")
-        })?;
-        let [open, high, low, close] = ["open", "high", "low", "close"].map(|name| prices(&table, name, format.price_scale));
-        let (open, high, low, close) = (open?, high?, low?, close?);
-        let volume = table.floats_complete("volume")?;
-        let bars = spans
-            .into_iter()
-            .enumerate()
-            .map(|(k, (open_at, known_at))| Bar {
-                open_at,
-                known_at,
-                open: open[k],
-                high: high[k],
-                low: low[k],
-                close: close[k],
-                volume: volume[k],
-            })
-            .collect();
+        let bars = bars(&table, format, interval)?;
         Self::new(bars, Quotes::default()).map_err(|error| in_file(&table, &error, format.price_scale))
     }
 
@@ -102,14 +68,40 @@ impl History {
         }
         Self::new(Vec::new(), quotes).map_err(|error| in_file(&table, &error, format.price_scale))
     }
+}
 
-    /// The bars of this history with the quotes of `other`.
-    ///
-    /// # Errors
-    /// None that either does not have already.
-    pub fn with_quotes_of(self, other: &Self) -> Result<Self, HistoryError> {
-        Self::new(self.bars().to_vec(), other.quotes().clone())
+/// The bars of a table, of which each has its two times; prices are held to be above 0, and nothing else.
+pub(super) fn bars(table: &Table, format: &FeedFormat, interval: Option<i64>) -> Result<Vec<Bar>, InputError> {
+    let Some(stamp) = format.stamp else {
+        let error = InputError::new(table.path(), "nothing says which end of a bar its time names");
+        return Err(error.hint("add stamp = \"open\" or stamp = \"close\" to the section that names the file"));
+    };
+    let times = table.times("ts", &format.time)?;
+    check_increasing(table, "ts", &times, Increase::Strictly)?;
+    if let (Some(declared), Some(common)) = (interval, common_spacing(&times))
+        && common < declared
+    {
+        let message =
+            format!("most bars are {} s apart, but `interval` says {} s", common as f64 / 1e9, declared as f64 / 1e9);
+        return Err(InputError::new(table.path(), message).in_column("ts").hint("give the length of one bar"));
     }
+    let spans = stamp.spans(&times, interval).ok_or_else(|| {
+        let error = InputError::new(table.path(), "one bar alone does not show how long a bar is");
+        error.hint("declare it: interval = \"1m\" in [[data]]; the tape of a twin needs two bars at least")
+    })?;
+    let [open, high, low, close] = ["open", "high", "low", "close"].map(|name| prices(table, name, format.price_scale));
+    let (open, high, low, close) = (open?, high?, low?, close?);
+    let volume = table.floats_complete("volume")?;
+    let bar = |(k, (open_at, known_at)): (usize, (Timestamp, Timestamp))| Bar {
+        open_at,
+        known_at,
+        open: open[k],
+        high: high[k],
+        low: low[k],
+        close: close[k],
+        volume: volume[k],
+    };
+    Ok(spans.into_iter().enumerate().map(bar).collect())
 }
 
 /// A column of prices, scaled.
@@ -144,7 +136,7 @@ fn levels(table: &Table, price: &str, size: &str, scale: f64) -> Result<Vec<Opti
 }
 
 /// The error at its place in the file, in the file's own unit.
-fn in_file(table: &Table, error: &HistoryError, scale: f64) -> InputError {
+pub(super) fn in_file(table: &Table, error: &HistoryError, scale: f64) -> InputError {
     let (column, row, found) = match error {
         HistoryError::Time { row, found, .. } => ("ts", *row, found.to_string()),
         HistoryError::Span { row, open_at, .. } => ("ts", *row, open_at.to_string()),

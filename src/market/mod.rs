@@ -29,6 +29,10 @@ mod quote;
 mod run;
 #[cfg(feature = "io")]
 mod run_log;
+#[cfg(feature = "io")]
+mod run_needs;
+#[cfg(feature = "io")]
+mod run_page;
 mod session;
 mod strategy;
 mod tape;
@@ -39,7 +43,7 @@ mod twin;
 mod venue;
 
 pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
-pub use bar::{Bar, Stamp, common_spacing};
+pub use bar::Bar;
 pub use blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
 pub use book::{Book, Level, Walk};
 pub use check::{check_strategy, check_strategy_on};
@@ -60,12 +64,12 @@ pub use own_print::{Piece, own_print, shown_delay};
 pub use price_assumption::PriceAssumption;
 pub use quote::{Quote, QuoteSlice, Quotes};
 #[cfg(feature = "io")]
-pub use run::{RunSetUp, explained};
+pub use run::{PreparedRun, explained, prepare_run};
 #[cfg(feature = "io")]
-pub use run_log::{InputHash, Provenance, RunSummary};
+pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
 pub use session::Session;
 pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
-pub use tape::{Print, Seen, Tape, TapeBar};
+pub use tape::{Print, Seen, Tape};
 #[cfg(feature = "io")]
 pub use tape_file::{TapeFiles, read_tape};
 #[cfg(feature = "io")]

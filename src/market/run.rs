@@ -1,44 +1,80 @@
-//! Runs: what a RUN.toml sets up.
+//! Runs: what a RUN.toml sets up, and what it leaves.
 
-use crate::io::{DataEntry, FeedKind, InputError, RunFile, listed_mechanism};
-use crate::sim2real::{Assembly, Seed, Timestamp};
+use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash, listed_mechanism};
+use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 
-use super::{Backtest, BacktestError, Cash, Execution, History, Instrument, MECHANISMS, MoneyError, Settings};
+use super::run_log::InputFile;
+use super::{
+    Backtest, BacktestError, Cash, Execution, History, Instrument, MECHANISMS, MoneyError, Provenance, Record, Reference,
+    RunOutputs, Settings, run_needs,
+};
 
-/// A backtest as a run declares it.
+/// A backtest as a run declares it, with its data read.
 #[derive(Debug, Clone)]
-pub struct RunSetUp {
+pub struct PreparedRun {
     /// The backtest.
     pub backtest: Backtest,
-    /// Rows of each `[[data]]` file, those outside `start` and `end` among them.
-    pub rows: Vec<usize>,
+    /// What it was made of.
+    pub provenance: Provenance,
 }
 
-impl RunSetUp {
-    /// Sets up the backtest of `run`, and reads its data.
+/// Sets up the backtest of `run`, and reads its data. The strategy is for the caller to build, from `run.strategy` and
+/// [`RunFile::strategy_settings`].
+///
+/// # Errors
+/// Data of kinds no backtest runs on, instruments without data, data outside `start` and `end`; a `price` the data do not
+/// have; mechanisms, keys, units or values the registry does not know, or that need data there are none of; and what
+/// [`History::read_bars`] and [`History::read_quotes`] refuse.
+pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
+    let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
+    // What needs no data is said before they are read.
+    let venue = venue(run)?;
+    let mut inputs = vec![own_document(run)?];
+    let mut read = Vec::new();
+    for (index, entry) in run.data.iter().enumerate() {
+        let history = history(run, index, entry)?;
+        let rows = history.bars().len() + history.quotes().len();
+        inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: Some(rows) });
+        read.push(Some(history));
+    }
+    let joined = instruments.iter().enumerate().map(|(index, instrument)| joined(run, index, &instrument.symbol, &mut read));
+    let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
+    run_needs::check(run, &instruments, &histories)?;
+    let cash = Cash::nearest(run.run.cash).map_err(|error| money(run, &["run", "cash"], &error))?;
+    let borrowing_nothing = Settings::with_cash(cash);
+    let settings = Settings {
+        cash,
+        seed: Seed(run.run.seed),
+        max_leverage: run.run.max_leverage.unwrap_or(borrowing_nothing.max_leverage),
+        reference: reference(run, &histories)?,
+    };
+    let provenance = Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: run.run.seed,
+        currency: run.run.currency.clone(),
+        strategy: run.strategy.clone(),
+        mechanisms: venue.modelled().into_iter().map(str::to_owned).collect(),
+        reference: settings.reference.unwrap_or_else(|| Reference::suiting(&venue)),
+        inputs,
+    };
+    let backtest = Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))?;
+    Ok(PreparedRun { backtest, provenance })
+}
+
+impl PreparedRun {
+    /// All that `record`, the record of this backtest, is shown as.
     ///
     /// # Errors
-    /// Data of kinds no backtest runs on, instruments without data, data outside `start` and `end`; mechanisms, keys,
-    /// units or values the registry does not know, or that need quotes where there are none; and what
-    /// [`History::read_bars`] and [`History::read_quotes`] refuse.
-    pub fn of(run: &RunFile) -> Result<Self, InputError> {
-        let venue = venue(run)?;
-        let read = run.data.iter().enumerate().map(|(index, entry)| history(run, index, entry));
-        let read = read.collect::<Result<Vec<History>, InputError>>()?;
-        let rows = read.iter().map(|history| history.bars().len() + history.quotes().len()).collect();
-        let histories = run
-            .instruments
-            .iter()
-            .enumerate()
-            .map(|(index, instrument)| joined(run, index, &instrument.symbol, &read))
-            .collect::<Result<Vec<History>, InputError>>()?;
-        let instruments = run.instruments.iter().map(Instrument::from).collect();
-        let cash = Cash::nearest(run.run.cash).map_err(|error| money(run, &["run", "cash"], &error))?;
-        let settings = Settings { seed: Seed(run.run.seed), ..Settings::with_cash(cash) };
-        let settings = Settings { max_leverage: run.run.max_leverage.unwrap_or(settings.max_leverage), ..settings };
-        let backtest = Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))?;
-        Ok(Self { backtest, rows })
+    /// If an amount of cash is beyond what can be held.
+    pub fn outputs(&self, record: &Record) -> Result<RunOutputs, MoneyError> {
+        RunOutputs::new(self.provenance.clone(), &self.backtest, record)
     }
+}
+
+fn own_document(run: &RunFile) -> Result<InputFile, InputError> {
+    let path = run.document().path();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(InputFile { path: name, sha256: file_hash(path)?, rows: None })
 }
 
 /// The execution plant with the mechanisms of `run`.
@@ -46,14 +82,6 @@ fn venue(run: &RunFile) -> Result<Assembly<Execution>, InputError> {
     let mut venue = Assembly::new(Execution, MECHANISMS);
     for (index, entry) in run.mechanisms.iter().enumerate() {
         let (mechanism, form, parameters) = listed_mechanism(run.document(), index, entry, &Execution, MECHANISMS)?;
-        // On bars these would do nothing, unnoticed.
-        let of_the_book = entry.name == "book_walk" || entry.parameter("fraction").is_some() && entry.name == "half_spread";
-        let quoted = |symbol: &str| run.data.iter().any(|data| data.kind == FeedKind::Quotes && data.symbol == symbol);
-        if let Some(bare) = run.instruments.iter().find(|instrument| of_the_book && !quoted(&instrument.symbol)) {
-            let message = format!("`{}` needs quotes in this form, and there are none of `{}`", entry.name, bare.symbol);
-            let error = run.error(&["mechanism", &index.to_string(), "name"], message);
-            return Err(error.hint("add [[data]] with quotes, or use half_spread with bps"));
-        }
         venue = venue.with_mechanism(mechanism, form, parameters);
     }
     Ok(venue)
@@ -72,15 +100,15 @@ fn history(run: &RunFile, index: usize, entry: &DataEntry) -> Result<History, In
     }
 }
 
-/// All there is of the `index`-th instrument, between the run's `start` and `end`.
-fn joined(run: &RunFile, index: usize, symbol: &str, read: &[History]) -> Result<History, InputError> {
-    let of = |kind| run.data.iter().zip(read).find(|(data, _)| data.symbol == symbol && data.kind == kind).map(|(_, h)| h);
-    let whole = match (of(FeedKind::Bars), of(FeedKind::Quotes)) {
-        (Some(bars), Some(quotes)) => {
-            let joined = bars.clone().with_quotes_of(quotes);
-            joined.map_err(|error| run.error(&["instrument", &index.to_string()], error.to_string()))?
-        }
-        (Some(one), None) | (None, Some(one)) => one.clone(),
+/// All there is of the `index`-th instrument, taken from `read`, between the run's `start` and `end`.
+fn joined(run: &RunFile, index: usize, symbol: &str, read: &mut [Option<History>]) -> Result<History, InputError> {
+    let mut take = |kind| {
+        let at = run.data.iter().position(|data| data.symbol == symbol && data.kind == kind)?;
+        read[at].take()
+    };
+    let whole = match (take(FeedKind::Bars), take(FeedKind::Quotes)) {
+        (Some(bars), Some(quotes)) => bars.with_quotes_of(quotes),
+        (Some(one), None) | (None, Some(one)) => one,
         (None, None) => {
             let error = run.error(&["instrument", &index.to_string()], format!("there are no data of `{symbol}`"));
             return Err(error.hint("add [[data]] with its symbol and bars or quotes, or drop the instrument"));
@@ -94,15 +122,38 @@ fn joined(run: &RunFile, index: usize, symbol: &str, read: &[History]) -> Result
     let last = end.map_or(Timestamp::MAX, |end| Timestamp(end.0.saturating_sub(1)));
     let within = whole.within(start.unwrap_or(Timestamp::MIN), last);
     if within.bars().is_empty() && within.quotes().is_empty() {
-        let error = run.error(&["run"], format!("there are no data of `{symbol}` between `start` and `end`"));
+        let key = if start.is_some() { "start" } else { "end" };
+        let error = run.error(&["run", key], format!("there are no data of `{symbol}` between `start` and `end`"));
         return Err(error.hint("leave them out to run on all data; times without a zone in files are UTC unless declared"));
     }
     Ok(within)
 }
 
-/// The error of a backtest at its place in the run.
-///
-/// Amounts that overflow and prices that cannot be are known only once a backtest runs, so callers need this too.
+/// What `[run] price` asks for, as far as the data have it.
+fn reference(run: &RunFile, histories: &[History]) -> Result<Option<Reference>, InputError> {
+    let Some(price) = run.run.price else { return Ok(None) };
+    let refuse = |message: String, hint: &str| Err(run.error(&["run", "price"], message).hint(hint));
+    let quoted = histories.iter().any(|history| !history.quotes().is_empty());
+    match (price, quoted) {
+        (AssumedPrice::Mid, true) => Ok(Some(Reference::Mid)),
+        (AssumedPrice::Touch, true) => Ok(Some(Reference::Touch)),
+        (AssumedPrice::NextOpen, false) => Ok(None),
+        (AssumedPrice::Mid | AssumedPrice::Touch, false) => refuse(
+            format!("the price \"{}\" needs quotes, and there are none", price.word()),
+            "with bars it is \"next_open\"",
+        ),
+        (AssumedPrice::NextOpen, true) => {
+            refuse("orders meet the quotes, which are there".to_owned(), "with quotes it is \"mid\" or \"touch\"")
+        }
+        (AssumedPrice::Last | AssumedPrice::BarClose, _) => refuse(
+            format!("\"{}\" is what an order was decided on: no order meets it", price.word()),
+            "give \"next_open\" with bars, \"mid\" or \"touch\" with quotes",
+        ),
+    }
+}
+
+/// The error of a backtest at its place in the run: amounts that overflow and prices that cannot be are known only once it
+/// runs.
 #[must_use]
 pub fn explained(run: &RunFile, error: &BacktestError) -> InputError {
     let keys: &[&str] = match error {

@@ -1,29 +1,23 @@
 //! What a backtest leaves on disk: its summary, and its orders, fills and equity in the form of an execution log.
 
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
-use crate::io::OutputTable;
+use crate::io::{InputError, OutputFolder, OutputTable};
+use crate::report::{BacktestPage, ReportError};
 
 use super::metric::{Counts, InstrumentSummary, Metrics};
-use super::{Instrument, MoneyError, Record, Reference};
+use super::run_page::run_page;
+use super::{Backtest, Instrument, MoneyError, Record, Reference};
 
 /// A file a run depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct InputHash {
+pub struct InputFile {
     /// Path, as the run names it.
     pub path: String,
-    /// SHA-256 of its bytes, in hexadecimal.
+    /// SHA-256 of its bytes, in hexadecimal digits.
     pub sha256: String,
-}
-
-impl InputHash {
-    /// The hash of a file that holds `bytes`.
-    #[must_use]
-    pub fn of(path: impl Into<String>, bytes: &[u8]) -> Self {
-        let sha256 = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-        Self { path: path.into(), sha256 }
-    }
+    /// Rows read, those outside `start` and `end` among them; none where it is no table.
+    pub rows: Option<usize>,
 }
 
 /// What a run was made of: the part of its summary that is not a result.
@@ -42,7 +36,7 @@ pub struct Provenance {
     /// The price mechanisms start from where there are quotes; with bars only it is the open.
     pub reference: Reference,
     /// Every file it read.
-    pub inputs: Vec<InputHash>,
+    pub inputs: Vec<InputFile>,
 }
 
 /// `run.json`.
@@ -77,6 +71,77 @@ impl RunSummary {
             counts: Counts::of(record),
             instruments: InstrumentSummary::of(record, instruments),
         })
+    }
+}
+
+/// All that a run is shown as.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunOutputs {
+    /// `run.json`.
+    pub summary: RunSummary,
+    /// `orders.parquet`.
+    pub orders: OutputTable,
+    /// `fills.parquet`.
+    pub fills: OutputTable,
+    /// `equity.parquet`.
+    pub equity: OutputTable,
+    /// `report.html`.
+    pub page: BacktestPage,
+}
+
+/// Outputs that cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// A file that cannot be written.
+    #[error(transparent)]
+    File(#[from] InputError),
+    /// A page that cannot be rendered.
+    #[error(transparent)]
+    Page(#[from] ReportError),
+    /// A summary that is no JSON.
+    #[error("run.json cannot be written: {0}\nhint: this is a bug in trueup, not in the input")]
+    Summary(#[from] serde_json::Error),
+}
+
+impl RunOutputs {
+    /// The files there will be.
+    pub const FILES: [&str; 5] = ["run.json", "orders.parquet", "fills.parquet", "equity.parquet", "report.html"];
+
+    /// What `record`, the record of `backtest`, is shown as.
+    ///
+    /// # Errors
+    /// If an amount of cash is beyond what can be held.
+    pub fn new(provenance: Provenance, backtest: &Backtest, record: &Record) -> Result<Self, MoneyError> {
+        let summary = RunSummary::new(provenance, record, backtest.instruments())?;
+        Ok(Self {
+            orders: record.orders_table(backtest.instruments(), &summary.provenance.strategy),
+            fills: record.fills_table(),
+            equity: record.equity_table(),
+            page: run_page(&summary, backtest, record),
+            summary,
+        })
+    }
+
+    /// `run.json` as text.
+    ///
+    /// # Errors
+    /// If the summary is no JSON, which would be a bug.
+    pub fn json(&self) -> Result<String, OutputError> {
+        Ok(format!("{}\n", serde_json::to_string_pretty(&self.summary)?))
+    }
+
+    /// Adds all files to `folder`.
+    ///
+    /// # Errors
+    /// As [`OutputFolder::file`], and a page or summary that cannot be made.
+    pub fn write(&self, folder: &mut OutputFolder) -> Result<(), OutputError> {
+        let [summary, orders, fills, equity, page] = Self::FILES;
+        folder.file(summary, self.json()?.as_bytes())?;
+        folder.table(orders, &self.orders)?;
+        folder.table(fills, &self.fills)?;
+        folder.table(equity, &self.equity)?;
+        folder.file(page, self.page.render()?.as_bytes())?;
+        Ok(())
     }
 }
 

@@ -261,6 +261,9 @@ impl<'d> Session<'d> {
             spread_and_impact: loss(mid, report.price),
             rounding: loss(report.price, price.to_f64()),
         };
+        for (mechanism, concession) in self.venue.concessions() {
+            *self.blotter.concessions.entry(mechanism).or_default() += concession * quantity.to_f64();
+        }
         let fill_id = self.blotter.fills.len() as u64 + 1;
         let realised = closes.then_some(realised);
         let filled_at = time;

@@ -2,7 +2,7 @@
 
 use crate::sim2real::Timestamp;
 
-use super::{Book, InFlight, Quotes, Side};
+use super::{Bar, Book, InFlight, Quotes, Side};
 
 /// A trade the market printed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,21 +15,6 @@ pub struct Print {
     pub size: f64,
     /// The side that took, where known.
     pub aggressor: Option<Side>,
-}
-
-/// What is used of a bar.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TapeBar {
-    /// When its interval began: the instant of its open.
-    pub open_at: Timestamp,
-    /// When its interval ended, and the bar was known.
-    pub known_at: Timestamp,
-    /// First price [currency].
-    pub open: f64,
-    /// Last price [currency].
-    pub close: f64,
-    /// Volume [units].
-    pub volume: f64,
 }
 
 /// What had happened by the time an order met the market: all up to and with its decision, and all strictly before it
@@ -76,7 +61,7 @@ impl Seen {
 pub struct Tape {
     quotes: Quotes,
     prints: Vec<Print>,
-    bars: Vec<TapeBar>,
+    bars: Vec<Bar>,
     notes: Vec<String>,
 }
 
@@ -84,7 +69,7 @@ impl Tape {
     /// A tape of quotes (oldest first), trades and bars. Trades and bars are put in order of time; those of one stamp
     /// stay in the order given.
     #[must_use]
-    pub fn new(quotes: Quotes, mut prints: Vec<Print>, mut bars: Vec<TapeBar>) -> Self {
+    pub fn new(quotes: Quotes, mut prints: Vec<Print>, mut bars: Vec<Bar>) -> Self {
         prints.sort_by_key(|print| print.time);
         bars.sort_by_key(|bar| bar.known_at);
         Self { quotes, prints, bars, notes: Vec::new() }
@@ -117,7 +102,7 @@ impl Tape {
 
     /// The bars, oldest first.
     #[must_use]
-    pub fn bars(&self) -> &[TapeBar] {
+    pub fn bars(&self) -> &[Bar] {
         &self.bars
     }
 
@@ -145,14 +130,14 @@ impl Tape {
     #[must_use]
     pub fn bar_close(&self, seen: Seen) -> Option<f64> {
         let last = seen.count(&self.bars, |bar| bar.known_at).checked_sub(1)?;
-        Some(self.bars[last].close)
+        Some(self.bars[last].close.to_f64())
     }
 
     /// Open of the first bar that begins no earlier than the end of what was `seen` [currency].
     #[must_use]
     pub fn next_open(&self, seen: Seen) -> Option<f64> {
         let next = self.bars.partition_point(|bar| bar.open_at < seen.end());
-        self.bars.get(next).map(|bar| bar.open)
+        self.bars.get(next).map(|bar| bar.open.to_f64())
     }
 
     /// Midway between bid and ask [currency]; where there are no quotes the last trade, else the last close, else the
@@ -224,7 +209,7 @@ impl Tape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::market::Level;
+    use crate::market::{Level, Price};
 
     fn level(price: f64, size: f64) -> Level {
         Level { price, size }
@@ -262,11 +247,14 @@ mod tests {
 
     #[test]
     fn bars_know_their_close_only_when_they_end() {
-        let bar = |k: i64| TapeBar {
+        let units = |price: i64| Price(price * 1_000_000_000);
+        let bar = |k: i64| Bar {
             open_at: Timestamp(k * 60),
             known_at: Timestamp((k + 1) * 60),
-            open: 10.0 + k as f64,
-            close: 20.0 + k as f64,
+            open: units(10 + k),
+            high: units(20 + k),
+            low: units(10 + k),
+            close: units(20 + k),
             volume: 100.0 * (k + 1) as f64,
         };
         let tape = Tape::new(Quotes::default(), Vec::new(), vec![bar(0), bar(1), bar(2)]);

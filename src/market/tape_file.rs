@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::io::{FeedFormat, InputError, Renames, Stamp, Table};
-use crate::sim2real::Timestamp;
+use crate::io::{FeedFormat, InputError, Renames, Table};
 
-use super::{Book, Level, Print, Quotes, Side, Tape, TapeBar};
+use super::history_file::{BAR_COLUMNS, bars, in_file};
+use super::{Bar, Book, History, Level, Print, Quotes, Side, Tape};
 
 /// The files of a tape; those that are named are read.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -28,7 +28,7 @@ const CROSSED: f64 = 0.01;
 ///
 /// # Errors
 /// What [`Table::read`] refuses; missing columns, cells that are no numbers or times; negative prices and sizes, and in
-/// trades and bars prices of 0; more than one crossed quote in a hundred; bars without a `stamp`, or a single bar.
+/// trades prices of 0; more than one crossed quote in a hundred; and what [`History::read_bars`] refuses of bars.
 pub fn read_tape(files: TapeFiles<'_>, format: &FeedFormat) -> Result<Tape, InputError> {
     let mut notes = Vec::new();
     let quotes = files.quotes.map(|path| read_quotes(path, format, &mut notes)).transpose()?.unwrap_or_default();
@@ -134,48 +134,9 @@ fn read_prints(path: &Path, format: &FeedFormat) -> Result<Vec<Print>, InputErro
     Ok((0..times.len()).map(print).collect())
 }
 
-fn read_bars(path: &Path, format: &FeedFormat) -> Result<Vec<TapeBar>, InputError> {
-    let Some(stamp) = format.stamp else {
-        return Err(InputError::new(path, "it is not said whether `ts` is the open or the close of a bar")
-            .hint("add stamp = \"open\" or stamp = \"close\" to [market] of the twin"));
-    };
-    let names = ["ts", "open", "high", "low", "close", "volume"];
-    let table = open(path, format, |name| names.contains(&name))?;
-    let times = table.times("ts", &format.time)?;
-    crate::io::check_increasing(&table, "ts", &times, crate::io::Increase::Strictly)?;
-    let (opens, closes) = (above_zero(&table, "open")?, above_zero(&table, "close")?);
-    let volumes = not_negative(&table, "volume")?;
-    let Some(length) = common_spacing(&times) else {
-        return Err(
-            InputError::new(path, "one bar alone does not say how long it is").hint("a tape needs two bars at least")
-        );
-    };
-    let bar = |row: usize| {
-        // A bar never reaches into its neighbour: a change of daylight saving time makes one shorter.
-        let (open_at, known_at) = match stamp {
-            Stamp::Open => {
-                (times[row], times.get(row + 1).map_or(times[row] + length, |next| *next.min(&(times[row] + length))))
-            }
-            Stamp::Close => {
-                let start = times[row] + -length;
-                (if row > 0 { start.max(times[row - 1]) } else { start }, times[row])
-            }
-        };
-        let scaled = |price: f64| price * format.price_scale;
-        TapeBar {
-            open_at,
-            known_at,
-            open: scaled(opens[row]),
-            close: scaled(closes[row]),
-            volume: volumes[row].unwrap_or(0.0),
-        }
-    };
-    Ok((0..times.len()).map(bar).collect())
-}
-
-/// The distance between neighbours that occurs most often [ns].
-fn common_spacing(times: &[Timestamp]) -> Option<i64> {
-    let mut spacings: Vec<i64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    spacings.sort_unstable();
-    spacings.chunk_by(|a, b| a == b).max_by_key(|run| run.len()).map(|run| run[0])
+fn read_bars(path: &Path, format: &FeedFormat) -> Result<Vec<Bar>, InputError> {
+    let table = open(path, format, |name| BAR_COLUMNS.contains(&name))?;
+    let bars = bars(&table, format, None)?;
+    let history = History::new(bars, Quotes::default()).map_err(|error| in_file(&table, &error, format.price_scale))?;
+    Ok(history.into_bars())
 }

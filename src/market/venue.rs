@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::sim2real::{Assembly, Run, Seed, Simulator, Thetas, Tick, Timestamp, Twin};
+use crate::sim2real::{Assembly, Run, Seed, Simulator, Site, Thetas, Tick, Timestamp, Twin};
 
 use super::{Book, Execution, History, InFlight, Met, Report, Side};
 
@@ -82,6 +82,10 @@ pub struct Venue<'d> {
     runs: Vec<Run<Execution>>,
     reference: Reference,
     averages: bool,
+    /// Ids of the mechanisms that act on prices, in their order; and what each added to the price of the last answer
+    /// [currency].
+    conceding: Vec<&'static str>,
+    concessions: Vec<f64>,
     /// Row of each instrument's history that the last order met, or would have without a delay: later ones look on from it.
     since: Vec<usize>,
     /// Orders on their way by when they meet the market, and which comes first at one time; and their places in `orders`.
@@ -110,14 +114,22 @@ impl<'d> Venue<'d> {
         let runs = symbols.iter().map(|symbol| assembly.run(&thetas, &still, seed.child(symbol))).collect();
         let (due, orders, free) = (BinaryHeap::new(), Vec::new(), Vec::new());
         let averages = assembly.modelled().contains(&"book_walk");
+        let at_plant = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Plant);
+        let conceding: Vec<&'static str> = at_plant.map(|about| about.name).collect();
+        let concessions = vec![0.0; conceding.len()];
         let since = vec![0; histories.len()];
-        Self { histories, runs, reference, averages, since, due, orders, free, origin, messages: 0 }
+        Self { histories, runs, reference, averages, conceding, concessions, since, due, orders, free, origin, messages: 0 }
     }
 
     /// Whether the prices it reports may be averages over several trades, which lie between ticks.
     #[must_use]
     pub fn averages(&self) -> bool {
         self.averages
+    }
+
+    /// What each mechanism added to the price of the last answer, against the order positive [currency], by its id.
+    pub fn concessions(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.conceding.iter().copied().zip(self.concessions.iter().copied())
     }
 
     /// The price an order of `side` for `instrument` would meet if it arrived as it is decided and nothing stood between:
@@ -172,7 +184,18 @@ impl<'d> Venue<'d> {
         let tick = self.tick(time);
         let run = self.runs.get_mut(instrument)?;
         run.deliver(&[order]);
-        run.advance(tick, |_| met);
+        let (concessions, mut before) = (&mut self.concessions, 0.0);
+        run.advance_seen(
+            tick,
+            |_| met,
+            |law, effects| {
+                let after = effects.first().map_or(0.0, |effect| effect.concession);
+                if let Some(own) = concessions.get_mut(law) {
+                    *own = after - before;
+                }
+                before = after;
+            },
+        );
         let report = *run.observe(tick.time).first()?;
         Some(Answer { order_id, instrument, time, mid, report })
     }

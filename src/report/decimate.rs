@@ -17,7 +17,7 @@ pub(super) fn extremes(x: &[f64], y: &[Option<f64>], buckets: usize) -> Vec<Vec<
     let mut stretches = vec![Vec::new()];
     let mut row = 0;
     while row < rows {
-        let here = column(row);
+        let (here, start) = (column(row), row);
         let (mut least, mut most): (Option<usize>, Option<usize>) = (None, None);
         while row < rows && column(row) == here {
             if let Some(value) = sample(x, y, row) {
@@ -33,8 +33,15 @@ pub(super) fn extremes(x: &[f64], y: &[Option<f64>], buckets: usize) -> Vec<Vec<
         match (least, most) {
             (Some(a), Some(b)) => {
                 let stretch = stretches.last_mut();
-                let kept = [a.min(b), a.max(b)];
-                let kept = if a == b { &kept[..1] } else { &kept[..] };
+                let mut kept = vec![a.min(b), a.max(b)];
+                // Beside an empty column the outermost rows are seen too: the line across it joins them.
+                if start > 0 && here > column(start - 1) + 1 {
+                    kept.insert(0, start);
+                }
+                if row < rows && column(row) > here + 1 {
+                    kept.push(row - 1);
+                }
+                kept.dedup();
                 if let Some(stretch) = stretch {
                     stretch.extend(kept.iter().filter_map(|r| Some((x[*r], sample(x, y, *r)?))));
                 }
@@ -89,6 +96,16 @@ mod tests {
         assert!(points.len() <= 600, "{}", points.len());
         assert!(points.contains(&(54_321.0, 40.0)) && points.contains(&(54_322.0, -40.0)));
         assert!(points.windows(2).all(|p| p[0].0 < p[1].0), "rows out of order");
+    }
+
+    #[test]
+    fn a_line_across_missing_time_joins_what_is_beside_it() {
+        let x: Vec<f64> = (0..1_000).map(f64::from).chain((100_000..101_000).map(f64::from)).collect();
+        // Held at first, and no longer when the data pause: a line at the highest value would tell otherwise.
+        let y: Vec<Option<f64>> = (0..2_000).map(|k| Some(if (100..900).contains(&k) { 1.0 } else { 0.0 })).collect();
+        let points = extremes(&x, &y, 50).concat();
+        assert!(points.contains(&(999.0, 0.0)) && points.contains(&(100_000.0, 0.0)), "{points:?}");
+        assert!(points.len() <= 100 && points.windows(2).all(|p| p[0].0 < p[1].0));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! `templates/x.html`. Only `plot` knows the plotting library.
 
 mod backtest;
+mod data_time;
 mod decimate;
 mod diagnosis;
 mod figures;

@@ -5,6 +5,7 @@
 
 mod svg;
 
+use chrono::DateTime;
 use kuva::plot::scatter::ScatterPlot;
 use kuva::plot::{LinePlot, LineStyle};
 use kuva::render::annotations::{ReferenceLine, ShadedRegion, TextAnnotation};
@@ -13,6 +14,7 @@ use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::render::render_multiple;
 use kuva::render::theme::Theme;
 
+use super::data_time::{Cut, instant};
 use super::decimate::{extremes, thin};
 use super::quantity::tick;
 
@@ -93,11 +95,11 @@ pub(super) struct Shade {
 }
 
 /// What the x axis counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Scale {
     Number,
-    /// Seconds since the Unix epoch, UTC.
-    Date,
+    /// Places of [`DataTime`](super::data_time::DataTime) with these cuts; without any, seconds since the Unix epoch, UTC.
+    Date(Vec<Cut>),
 }
 
 /// A plot, before it is drawn.
@@ -215,6 +217,9 @@ impl Plot<'_> {
         theme.grid_color = "var(--grid)".into();
         theme.text_color = "var(--soft)".into();
         let x_step = round_step((x.1 - x.0) / (width / 95.0).max(2.0));
+        // Dates with their years are wide, and the last may stand at the very end.
+        let cut = matches!(&self.scale, Scale::Date(cuts) if !cuts.is_empty());
+        let margin_right = if cut { 38.0 } else { 12.0 };
         let mut layout = Layout::new(x, y)
             .with_width(width)
             .with_height(height)
@@ -225,7 +230,7 @@ impl Plot<'_> {
             .with_y_axis_max(y.1)
             .with_y_tick_step(round_step((y.1 - y.0) / ((height - 60.0) / 36.0).max(2.0)))
             // The same margins everywhere, so that plots of the same time stand exactly below each other.
-            .with_force_margins(MARGIN_LEFT, 12.0)
+            .with_force_margins(MARGIN_LEFT, margin_right)
             .with_force_margins_y(8.0, if self.x_label.is_empty() { 26.0 } else { 46.0 })
             .with_x_label(plain(&self.x_label))
             .with_y_label(plain(&self.y_label))
@@ -233,9 +238,21 @@ impl Plot<'_> {
             .with_tick_size(12)
             .with_label_size(13)
             .with_tick_length(4.0);
-        layout = match self.scale {
+        layout = match &self.scale {
             Scale::Number => layout.with_x_tick_step(x_step),
-            Scale::Date => layout.with_x_datetime(date_axis(x.1 - x.0, width / 86.0)),
+            Scale::Date(cuts) if cuts.is_empty() => layout.with_x_datetime(date_axis(x.1 - x.0, width / 86.0).0),
+            Scale::Date(cuts) => {
+                // Ticks of whole days, with their years: a cut may lie between any two.
+                let (_, seconds) = date_axis(x.1 - x.0, width / 100.0);
+                let step = (seconds / DAY).round().max(1.0) * DAY;
+                let cuts = cuts.clone();
+                // Within a cut there is nothing to date.
+                let date = move |place: f64| {
+                    let cut = cuts.iter().any(|cut| place > cut.around.0 && place < cut.around.1);
+                    if cut { String::new() } else { date(instant(place, &cuts)) }
+                };
+                layout.with_x_tick_step(step).with_x_tick_format(TickFormat::Custom(std::sync::Arc::new(date)))
+            }
         };
         for shade in &self.shades {
             let (start, end) = (shade.start.max(x.0), shade.end.min(x.1));
@@ -281,11 +298,17 @@ fn round_step(step: f64) -> f64 {
     nearest.unwrap_or(1.0) * power
 }
 
-/// Calendar ticks, at most `most` of them over `span` seconds.
-fn date_axis(span: f64, most: f64) -> DateTimeAxis {
+const DAY: f64 = 86_400.0;
+
+/// The day of an instant [s since the Unix epoch, UTC].
+fn date(seconds: f64) -> String {
+    DateTime::from_timestamp(seconds as i64, 0).map_or_else(String::new, |time| time.format("%Y-%m-%d").to_string())
+}
+
+/// Calendar ticks, at most `most` of them over `span` seconds, and their distance [s].
+fn date_axis(span: f64, most: f64) -> (DateTimeAxis, f64) {
     const MINUTE: f64 = 60.0;
     const HOUR: f64 = 60.0 * MINUTE;
-    const DAY: f64 = 24.0 * HOUR;
     const MONTH: f64 = 30.44 * DAY;
     const YEAR: f64 = 365.25 * DAY;
     let steps = [
@@ -309,8 +332,8 @@ fn date_axis(span: f64, most: f64) -> DateTimeAxis {
         (DateUnit::Year, 5, 5.0 * YEAR, "%Y"),
     ];
     let fits = steps.into_iter().find(|(_, _, seconds, _)| span / seconds <= most);
-    let (unit, step, _, format) = fits.unwrap_or((DateUnit::Year, 10, 10.0 * YEAR, "%Y"));
-    DateTimeAxis { unit, step, format: format.into() }
+    let (unit, step, seconds, format) = fits.unwrap_or((DateUnit::Year, 10, 10.0 * YEAR, "%Y"));
+    (DateTimeAxis { unit, step, format: format.into() }, seconds)
 }
 
 #[cfg(test)]
@@ -359,7 +382,7 @@ mod tests {
     #[test]
     fn steps_are_round() {
         assert_eq!((round_step(0.23), round_step(20.0), round_step(8.0)), (0.25, 20.0, 10.0));
-        assert_eq!(date_axis(86_400.0 * 365.0, 9.0).step, 3);
-        assert_eq!(date_axis(86_400.0 * 36_500.0, 3.0).step, 10);
+        assert_eq!(date_axis(86_400.0 * 365.0, 9.0).0.step, 3);
+        assert_eq!(date_axis(86_400.0 * 36_500.0, 3.0).0.step, 10);
     }
 }

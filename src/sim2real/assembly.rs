@@ -166,11 +166,23 @@ impl<P: Plant> Run<P> {
 
     /// Lets the commands last sent or delivered act on the plant, which meets `input` of each lane's command.
     pub fn advance(&mut self, tick: Tick, input: impl Fn(&P::Command) -> P::Input) {
+        self.advance_seen(tick, input, |_, _| {});
+    }
+
+    /// As [`advance`](Self::advance), and shows `seen` the effects after each plant law, with the law's number among the
+    /// plant laws: what it adds is the difference to what was there before.
+    pub fn advance_seen(
+        &mut self,
+        tick: Tick,
+        input: impl Fn(&P::Command) -> P::Input,
+        mut seen: impl FnMut(usize, &[P::Effect]),
+    ) {
         self.inputs.clear();
         self.inputs.extend(self.commands.iter().map(input));
         self.effects.fill(P::Effect::default());
-        for law in &mut self.plant_laws {
+        for (k, law) in self.plant_laws.iter_mut().enumerate() {
             law.act(tick, &self.states, &self.inputs, &self.commands, &mut self.effects);
+            seen(k, &self.effects);
         }
         self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
     }

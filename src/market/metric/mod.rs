@@ -10,7 +10,7 @@ use super::{Fill, Held, Instrument, MoneyError, Record, Status};
 
 pub use cost::Costs;
 pub use drawdown::Drawdown;
-pub use returns::{Returns, Sampling};
+pub use returns::Returns;
 
 /// The figures of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,9 +21,9 @@ pub struct Metrics {
     pub final_equity: f64,
     /// `final_equity / initial_equity - 1` (a fraction).
     pub total_return: Option<f64>,
-    /// Return a year of 365.25 days, compounded (a fraction); none for less than a day of data.
+    /// Return a year of 365.25 days, compounded (a fraction); none where [`Returns::make_a_year`] says no.
     pub cagr: Option<f64>,
-    /// Volatility and Sharpe ratio, with the sampling they rest on.
+    /// Volatility and Sharpe ratio, with the number of returns they rest on.
     #[serde(flatten)]
     pub returns: Returns,
     /// The deepest fall from an earlier high; none where equity never fell.
@@ -103,13 +103,13 @@ impl Metrics {
         }
         let Held { events, invested, leverage } = record.held;
         let per_event = |sum: f64| if events > 0 { Some(sum / events as f64) } else { None };
-        let a_day = 1.0 / returns::DAYS_A_YEAR;
+        let returns = Returns::of(points);
         Ok(Self {
             initial_equity: initial,
             final_equity: last,
             total_return: growth.map(|g| g - 1.0),
-            cagr: growth.filter(|g| *g > 0.0 && years >= a_day).and_then(|g| defined(g.powf(1.0 / years) - 1.0)),
-            returns: Returns::of(points),
+            cagr: growth.filter(|g| *g > 0.0 && returns.make_a_year()).and_then(|g| defined(g.powf(1.0 / years) - 1.0)),
+            returns,
             max_drawdown: Drawdown::deepest(initial, points),
             turnover: if mean_equity > 0.0 { defined(traded / mean_equity) } else { None },
             exposure: per_event(invested as f64),

@@ -3,7 +3,8 @@
 use minijinja::{Value, context};
 
 use crate::report::backtest::BacktestPage;
-use crate::report::plot::{Curve, Ink, Mark, Plot, Scale};
+use crate::report::data_time::{Cut, DataTime};
+use crate::report::plot::{Curve, Ink, Mark, Plot, Scale, Shade};
 use crate::report::quantity::axis;
 use crate::report::section::{ReportError, Section, fill};
 
@@ -27,19 +28,19 @@ impl Section for Equity<'_> {
         if self.page.equity.is_empty() {
             return Ok(String::new());
         }
-        let time = seconds(&self.page.time);
+        let DataTime { places: time, cuts } = DataTime::of(&self.page.time);
         let equity = Plot {
             alt: "Equity over time".into(),
             x_label: String::new(),
             y_label: axis("equity", &self.page.currency),
-            scale: Scale::Date,
+            shades: gaps(&cuts),
+            scale: Scale::Date(cuts),
             curves: vec![Curve {
                 ink: Ink::Equity,
                 mark: Mark::Line,
                 x: &time,
                 y: self.page.equity.iter().map(|v| Some(*v)).collect(),
             }],
-            shades: Vec::new(),
             zero: false,
             diagonal: false,
             within: None,
@@ -66,9 +67,9 @@ impl Section for Equity<'_> {
     }
 }
 
-/// Nanoseconds since the epoch as seconds, for plotting.
-pub(super) fn seconds(time: &[i64]) -> Vec<f64> {
-    time.iter().map(|ns| *ns as f64 * 1e-9).collect()
+/// Where time was cut, as stretches to point at.
+pub(super) fn gaps(cuts: &[Cut]) -> Vec<Shade> {
+    cuts.iter().map(|cut| Shade { start: cut.around.0, end: cut.around.1, label: "gap".into() }).collect()
 }
 
 /// By how much equity lies below its highest value so far [%]; none where that is not positive.

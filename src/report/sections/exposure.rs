@@ -3,11 +3,12 @@
 use minijinja::{Value, context};
 
 use crate::report::backtest::{BacktestPage, Exposure};
+use crate::report::data_time::DataTime;
 use crate::report::plot::{Curve, Ink, Mark, Plot, Scale};
 use crate::report::quantity::axis;
 use crate::report::section::{ReportError, Section, fill};
 
-use super::equity::{COLUMNS, seconds};
+use super::equity::{COLUMNS, gaps};
 
 pub(in crate::report) struct ExposurePlot<'a> {
     pub page: &'a BacktestPage,
@@ -29,7 +30,7 @@ impl Section for ExposurePlot<'_> {
                 units.push(&exposure.unit);
             }
         }
-        let time = seconds(&self.page.time);
+        let time = DataTime::of(&self.page.time);
         // As many series to a plot as there are colours.
         let groups = units.iter().flat_map(|unit| {
             let alike: Vec<&Exposure> = self.page.exposures.iter().filter(|e| e.unit == *unit).collect();
@@ -43,25 +44,25 @@ impl Section for ExposurePlot<'_> {
     }
 }
 
-fn plot(k: usize, group: &[&Exposure], time: &[f64]) -> Value {
+fn plot(k: usize, group: &[&Exposure], time: &DataTime) -> Value {
     let names: Vec<&str> = group.iter().map(|e| e.name.as_str()).collect();
     let unit = group.first().map_or("", |e| e.unit.as_str());
     let plot = Plot {
         alt: format!("Held over time: {}", names.join(", ")),
         x_label: "date (UTC)".into(),
         y_label: axis("held", unit),
-        scale: Scale::Date,
+        scale: Scale::Date(time.cuts.clone()),
         curves: group
             .iter()
             .enumerate()
             .map(|(n, e)| Curve {
                 ink: Ink::Member(n),
                 mark: Mark::Step,
-                x: time,
+                x: &time.places,
                 y: e.values.iter().map(|v| Some(*v)).collect(),
             })
             .collect(),
-        shades: Vec::new(),
+        shades: gaps(&time.cuts),
         zero: true,
         diagonal: false,
         within: None,
