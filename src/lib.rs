@@ -45,6 +45,8 @@
 #![deny(missing_docs)]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod conceal;
 #[cfg(feature = "io")]
 pub mod io;

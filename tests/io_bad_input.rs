@@ -505,6 +505,10 @@ fn a_run_is_held_to_its_contract() {
     run.toml:13:9: unknown value `opne`
       hint: did you mean `open`?
     ");
+    insta::assert_snapshot!(run("stamp = \"open\"", "stamp = \"open\"\ninterval = \"a minute\""), @r#"
+    run.toml:14:12: expected the length of a bar, found "a minute"
+      hint: a whole number and a unit: "1s", "5m", "1h", "1d"
+    "#);
     insta::assert_snapshot!(run("stamp = \"open\"", "trades = \"bars.csv\""), @"
     run.toml:10:1: expected exactly one of `bars`, `quotes`, `trades` and `book`
       hint: a second file of the same instrument has a [[data]] section of its own

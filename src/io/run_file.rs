@@ -46,6 +46,8 @@ pub struct RunSection {
     pub cash: f64,
     /// Currency of cash and prices.
     pub currency: String,
+    /// Largest sum of positions over equity; none for 1, which borrows nothing.
+    pub max_leverage: Option<f64>,
     /// The first instant of data that counts; none for all from the first.
     #[serde(default, deserialize_with = "instant")]
     pub start: Option<Timestamp>,
@@ -91,6 +93,8 @@ pub struct DataEntry {
     pub path: PathBuf,
     /// How it is written.
     pub format: FeedFormat,
+    /// Length of a bar [ns]; none where the distances between bars show it.
+    pub interval: Option<i64>,
 }
 
 #[derive(Deserialize)]
@@ -120,6 +124,8 @@ struct DataTable {
     trades: Option<String>,
     book: Option<String>,
     stamp: Option<Stamp>,
+    #[serde(default, deserialize_with = "interval")]
+    interval: Option<i64>,
     #[serde(default, deserialize_with = "zone")]
     zone: Option<Tz>,
     price_scale: Option<f64>,
@@ -232,7 +238,25 @@ fn data_entry(
     }
     let format = FeedFormat::of(table.stamp, table.zone, table.time_unit, table.price_scale, table.columns);
     format.check(document, &keys, kind == FeedKind::Bars)?;
-    Ok(DataEntry { symbol: table.symbol, kind, path: path.into(), format })
+    if table.interval.is_some() && kind != FeedKind::Bars {
+        let error = document.error(&["data", number, "interval"], "only bars have an `interval`");
+        return Err(error.hint("drop the key"));
+    }
+    Ok(DataEntry { symbol: table.symbol, kind, path: path.into(), format, interval: table.interval })
+}
+
+/// Reads the length of a bar [ns]: a whole number and one of s, m, h, d.
+fn interval<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<i64>, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    let units = [("s", 1), ("m", 60), ("h", 3_600), ("d", 86_400)];
+    let length = units.iter().find_map(|(unit, seconds)| {
+        let count: i64 = text.strip_suffix(unit)?.trim().parse().ok().filter(|count| *count > 0)?;
+        count.checked_mul(seconds * Timestamp::NANOS)
+    });
+    length.map(Some).ok_or_else(|| {
+        let hint = "a whole number and a unit: \"1s\", \"5m\", \"1h\", \"1d\"";
+        D::Error::custom(format!("invalid value: {text:?}, expected the length of a bar{HINT}{hint}"))
+    })
 }
 
 /// Reads an instant: RFC 3339, as a text or as TOML writes it by itself.

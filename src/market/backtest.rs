@@ -144,6 +144,12 @@ impl Backtest {
         &self.instruments
     }
 
+    /// What orders meet.
+    #[must_use]
+    pub fn venue(&self) -> &Assembly<Execution> {
+        &self.venue
+    }
+
     /// Their data.
     #[must_use]
     pub fn histories(&self) -> &[History] {

@@ -14,3 +14,16 @@ pub struct Instrument {
     /// Standard deviation of the daily return (a fraction), where known.
     pub daily_volatility: Option<f64>,
 }
+
+#[cfg(feature = "io")]
+impl From<&crate::io::InstrumentEntry> for Instrument {
+    fn from(entry: &crate::io::InstrumentEntry) -> Self {
+        Self {
+            symbol: entry.symbol.clone(),
+            tick_size: entry.tick_size,
+            lot_size: entry.lot_size,
+            average_daily_volume: entry.average_daily_volume,
+            daily_volatility: entry.daily_volatility,
+        }
+    }
+}

@@ -26,6 +26,8 @@ mod own_print;
 mod price_assumption;
 mod quote;
 #[cfg(feature = "io")]
+mod run;
+#[cfg(feature = "io")]
 mod run_log;
 mod session;
 mod strategy;
@@ -57,6 +59,8 @@ pub use order_log::{LogMarket, OrderLog};
 pub use own_print::{Piece, own_print, shown_delay};
 pub use price_assumption::PriceAssumption;
 pub use quote::{Quote, QuoteSlice, Quotes};
+#[cfg(feature = "io")]
+pub use run::{RunSetUp, explained};
 #[cfg(feature = "io")]
 pub use run_log::{InputHash, Provenance, RunSummary};
 pub use session::Session;

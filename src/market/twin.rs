@@ -24,7 +24,7 @@ pub fn execution_twin(
     let assembly = execution_assembly(twin)?;
     let recordings = execution_logs(twin, folders)?;
     for (index, entry) in twin.mechanisms.iter().enumerate() {
-        let (mechanism, form, _) = listed_mechanism(twin, index, MECHANISMS)?;
+        let (mechanism, form, _) = listed_mechanism(twin.document(), index, entry, &Execution, MECHANISMS)?;
         // A constant spread may well stand beside quotes: there it is only not what diagnosis would propose.
         let needs_nothing = entry.name == "half_spread" && entry.parameter("bps").is_some();
         let lacking = |log: &&Recording<OrderLog>| !needs_nothing && !mechanism.applies(form, &Execution, &log.stimulus);
@@ -53,8 +53,8 @@ pub fn execution_assembly(twin: &TwinFile) -> Result<Assembly<Execution>, InputE
             .hint("what stands between decision and fill is said by [[mechanism]] sections"));
     }
     let mut assembly = Assembly::new(Execution, MECHANISMS);
-    for index in 0..twin.mechanisms.len() {
-        let (mechanism, form, parameters) = listed_mechanism(twin, index, MECHANISMS)?;
+    for (index, entry) in twin.mechanisms.iter().enumerate() {
+        let (mechanism, form, parameters) = listed_mechanism(twin.document(), index, entry, &Execution, MECHANISMS)?;
         assembly = assembly.with_mechanism(mechanism, form, parameters);
     }
     let Some(assumptions) = &twin.assumptions else { return Err(no_assumptions(twin)) };
@@ -92,14 +92,7 @@ pub fn execution_logs(twin: &TwinFile, folders: &[PathBuf]) -> Result<Vec<Record
             .error(&["twin"], "the twin declares no [[instrument]]")
             .hint("add [[instrument]] with symbol and tick_size, and average_daily_volume where it is known"));
     }
-    let instrument = |entry: &crate::io::InstrumentEntry| Instrument {
-        symbol: entry.symbol.clone(),
-        tick_size: entry.tick_size,
-        lot_size: entry.lot_size,
-        average_daily_volume: entry.average_daily_volume,
-        daily_volatility: entry.daily_volatility,
-    };
-    let instruments: Vec<Instrument> = twin.instruments.iter().map(instrument).collect();
+    let instruments: Vec<Instrument> = twin.instruments.iter().map(Instrument::from).collect();
     let unnamed = MarketFiles::default();
     let market = twin.market.as_ref().unwrap_or(&unnamed);
     let files =

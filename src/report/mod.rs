@@ -9,7 +9,7 @@ mod diagnosis;
 mod figures;
 mod page;
 mod plot;
-mod quantity;
+pub(crate) mod quantity;
 mod section;
 mod sections;
 

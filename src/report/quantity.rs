@@ -1,10 +1,10 @@
 //! Numbers as a reader wants them: as many digits as mean something, thousands apart, a true minus.
 
 /// What stands for a value that is not defined.
-pub(super) const UNDEFINED: &str = "\u{2013}";
+pub(crate) const UNDEFINED: &str = "\u{2013}";
 
 /// `value` to `digits` significant digits.
-pub(super) fn significant(value: f64, digits: i32) -> String {
+pub(crate) fn significant(value: f64, digits: i32) -> String {
     if value.is_nan() {
         return UNDEFINED.into();
     }
@@ -22,12 +22,12 @@ pub(super) fn significant(value: f64, digits: i32) -> String {
 }
 
 /// `value` to three significant digits.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     significant(value, 3)
 }
 
 /// A value and its standard deviation, the latter to two digits and the former to the same place: `0.1803 ± 0.0021`.
-pub(super) fn uncertain(value: f64, std: f64) -> String {
+pub(crate) fn uncertain(value: f64, std: f64) -> String {
     if !std.is_finite() || std <= 0.0 || !value.is_finite() {
         return significant(value, 4);
     }
@@ -41,7 +41,7 @@ pub(super) fn uncertain(value: f64, std: f64) -> String {
 }
 
 /// A part of one as a percentage, with a space before the sign that does not break; 99.97 % does not read as 100 %, nor 0.02 % as 0 %.
-pub(super) fn percent(part: f64) -> String {
+pub(crate) fn percent(part: f64) -> String {
     if !part.is_finite() {
         return UNDEFINED.into();
     }
@@ -55,7 +55,7 @@ pub(super) fn percent(part: f64) -> String {
 }
 
 /// An interval of parts of one, as percentages to a tenth.
-pub(super) fn percents(low: f64, high: f64) -> String {
+pub(crate) fn percents(low: f64, high: f64) -> String {
     if !low.is_finite() || !high.is_finite() {
         return UNDEFINED.into();
     }
@@ -83,12 +83,12 @@ pub(super) fn tick(value: f64) -> String {
 }
 
 /// `text` with a unit after it, if there is one and something to measure with it.
-pub(super) fn with_unit(text: &str, unit: &str) -> String {
+pub(crate) fn with_unit(text: &str, unit: &str) -> String {
     if unit.is_empty() || text == UNDEFINED { text.into() } else { format!("{text} {unit}") }
 }
 
 /// An axis label: `position [rad]`.
-pub(super) fn axis(name: &str, unit: &str) -> String {
+pub(crate) fn axis(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.into() } else { format!("{name} [{unit}]") }
 }
 
@@ -122,7 +122,7 @@ fn superscript(c: char) -> char {
 }
 
 /// `value` with `places` decimals, thousands apart.
-pub(super) fn decimals(value: f64, places: usize) -> String {
+pub(crate) fn decimals(value: f64, places: usize) -> String {
     let text = format!("{:.places$}", value.abs());
     let (whole, fraction) = text.split_once('.').map_or((text.as_str(), None), |(w, f)| (w, Some(f)));
     let mut grouped = String::with_capacity(text.len() + 4);

@@ -31,9 +31,10 @@ pub fn joint_assembly(twin: &TwinFile) -> Result<Assembly<Joint>, InputError> {
         let quantity = parameter(twin, name, unit)?;
         (values[k], uncertainty[k]) = (quantity.value, quantity.uncertainty);
     }
-    let mut assembly = Assembly::new(Joint::new(axis, values, uncertainty), MECHANISMS);
-    for index in 0..twin.mechanisms.len() {
-        let (mechanism, form, parameters) = listed_mechanism(twin, index, MECHANISMS)?;
+    let joint = Joint::new(axis, values, uncertainty);
+    let mut assembly = Assembly::new(joint.clone(), MECHANISMS);
+    for (index, entry) in twin.mechanisms.iter().enumerate() {
+        let (mechanism, form, parameters) = listed_mechanism(twin.document(), index, entry, &joint, MECHANISMS)?;
         assembly = assembly.with_mechanism(mechanism, form, parameters);
     }
     Ok(assembly)

@@ -75,6 +75,17 @@ impl<P: Plant> Assembly<P> {
         self
     }
 
+    /// The mechanisms it has, in the order in which their parameters follow the plant's, each with the number of its
+    /// form and these parameters.
+    pub fn mechanisms(&self) -> impl Iterator<Item = (&'static dyn Mechanism<P>, usize, &[Parameter])> {
+        let mut at = self.plant.parameters().len();
+        self.parts.iter().map(move |part| {
+            let start = at;
+            at += part.mechanism.forms(&Default::default())[part.form].parameters.len();
+            (part.mechanism, part.form, &self.parameters[start..at])
+        })
+    }
+
     /// The same assembly with other values of its parameters, in their order.
     #[must_use]
     pub fn with_values(mut self, values: &[f64]) -> Self {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// One step of a run: the interval `[time, time + step)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tick {
-    /// Number of the tick in its run, from 0.
+    /// The row of the recording it lies in, or the number of the event.
     pub index: usize,
     /// Start of the tick [s], on the recording's own clock.
     pub time: f64,

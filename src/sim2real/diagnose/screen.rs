@@ -8,7 +8,7 @@ use crate::sim2real::identify::Block;
 use crate::sim2real::{Candidate, Twin};
 
 /// What screening found of one candidate.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Screened {
     /// Number of the candidate.
     pub number: usize,
@@ -19,8 +19,6 @@ pub(super) struct Screened {
     pub survival: f64,
     /// Its starts, the most promising first, each one value a parameter.
     pub starts: Vec<Vec<f64>>,
-    /// Its projected signature at the best start, of length 1.
-    pub signature: DVector<f64>,
 }
 
 /// Screens every candidate that `parent` does not have.
@@ -82,7 +80,7 @@ fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usi
     let candidate = &inquiry.candidates[number];
     let twin = parent.twin.with(candidate);
     let problem = inquiry.problem(&twin, &inquiry.evidence.compared);
-    let mut tried: Vec<(f64, f64, Vec<f64>, DVector<f64>)> = Vec::new();
+    let mut tried: Vec<(f64, f64, Vec<f64>)> = Vec::new();
     for start in starts(candidate) {
         let theta: Vec<f64> = parent.fit.values.iter().chain(&start).copied().collect();
         let residual = problem.evaluate(&theta, &parent.fit.state, &[]).residual;
@@ -95,15 +93,15 @@ fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usi
         let score = projected.dot(&ground.residual) / (length * misfit);
         // How far along its signature the misfit reaches, as a factor on this start.
         let reach = score * misfit / length;
-        tried.push((score, length / whole, start.clone(), projected.unscale(length)));
+        tried.push((score, length / whole, start.clone()));
         if let Some(scaled) = scaled(candidate, &start, reach) {
-            tried.push((score * 0.999, length / whole, scaled, DVector::zeros(0)));
+            tried.push((score * 0.999, length / whole, scaled));
         }
     }
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let (score, survival, _, signature) = tried.first()?.clone();
-    let starts = tried.into_iter().map(|(_, _, start, _)| start).collect();
-    Some(Screened { number, score, survival, starts, signature })
+    let (score, survival) = tried.first().map(|(score, survival, _)| (*score, *survival))?;
+    let starts = tried.into_iter().map(|(_, _, start)| start).collect();
+    Some(Screened { number, score, survival, starts })
 }
 
 /// All combinations of the starts of a candidate's parameters; before them, where there is one parameter, a tenth of the

@@ -120,8 +120,8 @@ pub(super) fn foretold(fitted: &[Left], held_out: &[Left], covariates: &BTreeMap
 /// Rows a regression uses at the most, or little more.
 const ROWS: usize = 6_000;
 
-/// Lags, in rows, at which covariates enter the regression.
-const LAGS: [usize; 4] = [0, 5, 20, 60];
+/// Lags, in rows, at which covariates enter the regression: what acts inside a plant shows in its output for a while.
+const LAGS: [usize; 7] = [0, 6, 15, 30, 60, 100, 160];
 
 fn stack(pieces: &[Left], covariates: &BTreeMap<String, Vec<Covariate>>) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let mut rows: Vec<Vec<f64>> = Vec::new();

@@ -20,6 +20,11 @@ const FORM_ERROR: f64 = 0.10;
 const DEPENDENT: f64 = 8.0;
 /// A residual counts as structured where a regression foretells this part of it on held-out data.
 const FORETOLD: f64 = 0.10;
+/// Where this part of it is foretold, what is left is physics, however small it is beside what was found.
+const FORETOLD_WELL: f64 = 0.25;
+/// A twin whose mean squared residual is this many times the noise does not explain the recordings, whether or not
+/// anything foretells what is left.
+const FAR_ABOVE_THE_NOISE: f64 = 9.0;
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
 const AT_THE_NOISE: f64 = 1.5;
 /// With fewer rows than this, what is not explained is not called explained either.
@@ -65,7 +70,7 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
 /// What the remaining residuals of messages depend on most.
 pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
     // Below the noise there is nothing to explain, however regular it is: rounding of the arithmetic is regular too.
-    if inquiry.twin.clock() != Clock::Event || at_the_noise(selected) {
+    if inquiry.twin.clock() != Clock::Event || within(selected, AT_THE_NOISE) {
         return None;
     }
     let parts = &inquiry.evidence.compared;
@@ -154,18 +159,18 @@ fn structured(findings: &Findings) -> bool {
     findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
 }
 
-/// Whether what is left is no more than the noise.
-fn at_the_noise<T>(hypothesis: &Hypothesis<T>) -> bool {
-    hypothesis.misfits.iter().all(|m| m.sum_of_squares <= AT_THE_NOISE * m.count as f64)
+/// Whether the mean square of what is left is at most `times` that of the noise.
+fn within<T>(hypothesis: &Hypothesis<T>, times: f64) -> bool {
+    hypothesis.misfits.iter().all(|m| m.sum_of_squares <= times * m.count as f64)
 }
 
 fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
-    let left_over = structured(findings) && !at_the_noise(&selection.selected);
+    let left_over = structured(findings) && !within(&selection.selected, AT_THE_NOISE);
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
-        return match left_over {
+        return match left_over || !within(&selection.selected, FAR_ABOVE_THE_NOISE) {
+            _ if rows < FEWEST_ROWS && !within(&selection.selected, AT_THE_NOISE) => Verdict::NotExcited,
             true => Verdict::Unexplained,
-            false if rows < FEWEST_ROWS && !at_the_noise(&selection.selected) => Verdict::NotExcited,
             false => Verdict::NoMismatch,
         };
     }
@@ -173,7 +178,7 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
         return Verdict::NotExcited;
     }
-    if left_over && findings.remainder > FORM_ERROR {
+    if left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
         return Verdict::Unexplained;
     }
     if effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }

@@ -68,6 +68,66 @@ pub fn fit<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize]
         stepped.iter().zip(&from).map(|(k, v)| if *v == 0.0 { parameters[*k].scale() } else { 0.2 * v.abs() }).collect();
     let (point, _) = minimize(|point| at(point).objective(), &from, &bounds, &scale, 60);
     let mut fit = at(&point);
+    for (i, k) in stepped.iter().enumerate() {
+        let objective = |value: f64| {
+            let mut theta = fit.values.clone();
+            theta[*k] = value;
+            problem.evaluate(&theta, &fit.state, &[]).residual.norm_squared()
+        };
+        fit.std[*k] = half_width(objective, point[i], bounds[i], scale[i]);
+    }
     fit.free = free.to_vec();
     fit
+}
+
+/// By how far a parameter can be moved before the objective rises by 1, the mean of both directions in which it does:
+/// the standard deviation, were the objective a parabola.
+fn half_width(objective: impl Fn(f64) -> f64, best: f64, bounds: (f64, f64), scale: f64) -> f64 {
+    let limit = objective(best) + 1.0;
+    let reach = |direction: f64| {
+        let rises = |step: f64| {
+            let value = best + direction * step;
+            (bounds.0..=bounds.1).contains(&value).then(|| objective(value) > limit)
+        };
+        let (mut inside, mut step) = (0.0, 1e-6 * scale);
+        while rises(step) == Some(false) {
+            (inside, step) = (step, 4.0 * step);
+        }
+        rises(step)?;
+        for _ in 0..12 {
+            let middle = 0.5 * (inside + step);
+            if rises(middle) == Some(true) { step = middle } else { inside = middle }
+        }
+        Some(step)
+    };
+    let reached: Vec<f64> = [-1.0, 1.0].into_iter().filter_map(reach).collect();
+    if reached.is_empty() { f64::INFINITY } else { reached.iter().sum::<f64>() / reached.len() as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_the_least_within_bounds() {
+        let bowl = |x: &[f64]| (x[0] - 3.0).powi(2) + 10.0 * (x[1] + 1.0).powi(2);
+        let (x, value) = minimize(bowl, &[0.0, 0.0], &[(-10.0, 10.0), (-0.5, 10.0)], &[1.0, 1.0], 300);
+        assert!((x[0] - 3.0).abs() < 1e-2 && (x[1] + 0.5).abs() < 1e-2, "{x:?}");
+        assert!((value - 2.5).abs() < 0.05);
+    }
+
+    #[test]
+    fn stays_where_it_is_on_a_plateau() {
+        let (x, _) = minimize(|x| if x[0] < 0.2 { 5.0 } else { 1.0 }, &[0.25], &[(0.0, 60.0)], &[0.05], 60);
+        assert_eq!(x, [0.25]);
+    }
+
+    #[test]
+    fn the_half_width_of_a_parabola_is_its_standard_deviation() {
+        let parabola = |x: f64| ((x - 2.0) / 0.3).powi(2);
+        assert!((half_width(parabola, 2.0, (0.0, 10.0), 1.0) - 0.3).abs() < 1e-3);
+        // Where one side never rises, the other decides.
+        let cliff = |x: f64| if x < 1.9 { 9.0 } else { 0.0 };
+        assert!((half_width(cliff, 2.0, (0.0, 10.0), 1.0) - 0.1).abs() < 1e-3);
+    }
 }

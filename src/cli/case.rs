@@ -1,0 +1,121 @@
+//! A twin and the recordings it is held to, of whichever domain its model is.
+
+use std::path::{Path, PathBuf};
+
+use crate::io::{InputError, TwinFile, hint_among};
+use crate::market::{Execution, execution_twin};
+use crate::robot::{Joint, joint_assembly, joint_recordings};
+use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, calibrate, diagnose};
+use crate::sim2real::{Assembly, Plant, Recording, Seed, Simulator};
+
+use super::fitted::FittedTwin;
+use super::screen::Progress;
+
+/// The models a twin can name.
+const MODELS: [&str; 2] = ["joint", "execution"];
+
+/// A twin with its recordings.
+#[derive(Debug)]
+pub(super) enum Case {
+    Joint(Given<Joint>),
+    Execution(Given<Execution>),
+}
+
+#[derive(Debug)]
+pub(super) struct Given<P: Plant> {
+    twin: Assembly<P>,
+    recordings: Vec<Recording<P::Stimulus>>,
+    held_out: Vec<Recording<P::Stimulus>>,
+}
+
+/// What a diagnosis leaves.
+#[derive(Debug)]
+pub(super) struct Diagnosed {
+    pub diagnosis: Diagnosis,
+    /// The trued twin.
+    pub trued: FittedTwin,
+    pub comparisons: Vec<Comparison>,
+}
+
+impl Case {
+    /// Reads the recordings at `recordings` and `held_out` as `twin` says.
+    ///
+    /// # Errors
+    /// A model there is not, a recording that is fitted and held out, and what the domain's readers refuse.
+    pub fn read(twin: &TwinFile, recordings: &[PathBuf], held_out: &[PathBuf]) -> Result<Self, InputError> {
+        check_apart(recordings, held_out)?;
+        match twin.model.as_str() {
+            "joint" => Ok(Self::Joint(Given {
+                twin: joint_assembly(twin)?,
+                recordings: joint_recordings(twin, recordings)?,
+                held_out: joint_recordings(twin, held_out)?,
+            })),
+            "execution" => {
+                // Read together, so that the tape is read once.
+                let paths: Vec<PathBuf> = recordings.iter().chain(held_out).cloned().collect();
+                let (assembly, mut all) = execution_twin(twin, &paths)?;
+                let held_out = all.split_off(recordings.len());
+                Ok(Self::Execution(Given { twin: assembly, recordings: all, held_out }))
+            }
+            other => {
+                let error = twin.error(&["twin", "model"], format!("there is no model `{other}`"));
+                Err(error.maybe_hint(hint_among(other, &MODELS)))
+            }
+        }
+    }
+
+    /// Finds what the twin leaves out.
+    pub fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
+        match self {
+            Self::Joint(given) => given.diagnose(seed, progress),
+            Self::Execution(given) => given.diagnose(seed, progress),
+        }
+    }
+
+    /// Refits the parameters the twin has; gives the twin they make.
+    pub fn calibrate(&self, seed: Seed, progress: &Progress) -> (Calibration, FittedTwin) {
+        match self {
+            Self::Joint(given) => given.calibrate(seed, progress),
+            Self::Execution(given) => given.calibrate(seed, progress),
+        }
+    }
+
+    /// Whether the twin has a parameter that a fit may move.
+    pub fn has_free_parameters(&self) -> bool {
+        let parameters = match self {
+            Self::Joint(given) => given.twin.parameters(),
+            Self::Execution(given) => given.twin.parameters(),
+        };
+        parameters.iter().any(|parameter| !parameter.frozen())
+    }
+}
+
+impl<P: Plant> Given<P> {
+    fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
+        let tell = |step: &str, done: usize, of: usize| progress.tell(step, done, of);
+        let outcome = diagnose(&self.twin, &self.recordings, &self.held_out, seed, &tell);
+        Diagnosed {
+            trued: FittedTwin::of(&outcome.trued, &outcome.values, &outcome.std),
+            diagnosis: outcome.diagnosis,
+            comparisons: outcome.comparisons,
+        }
+    }
+
+    fn calibrate(&self, seed: Seed, progress: &Progress) -> (Calibration, FittedTwin) {
+        let tell = |step: &str, done: usize, of: usize| progress.tell(step, done, of);
+        let calibration = calibrate(&self.twin, &self.recordings, &self.held_out, seed, &tell);
+        let twin = FittedTwin::of(&self.twin, &calibration.values, &calibration.std);
+        (calibration, twin)
+    }
+}
+
+/// Holds what is to be held out not to be fitted too: the proof would be none.
+fn check_apart(recordings: &[PathBuf], held_out: &[PathBuf]) -> Result<(), InputError> {
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let fitted: Vec<PathBuf> = recordings.iter().map(|path| real(path)).collect();
+    match held_out.iter().find(|path| fitted.contains(&real(path))) {
+        None => Ok(()),
+        Some(path) => Err(InputError::new(path, "the recording is fitted and held out at once")
+            .hint("name another under --holdout, or none: then the last 30 % of each recording is held out")),
+    }
+}

@@ -1,0 +1,148 @@
+//! The terminal: results on standard output, progress on standard error.
+
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::sync::Mutex;
+use std::time::Duration;
+
+use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent, presets};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::stop::Stop;
+use crate::io::InputError;
+
+/// Columns of text where there is no terminal to ask.
+const DEFAULT_WIDTH: u16 = 110;
+
+/// Where a command shows what it does and what came of it.
+#[derive(Debug)]
+pub(super) struct Screen {
+    width: u16,
+    progress: bool,
+}
+
+impl Screen {
+    /// The terminal of this process; `progress` is told even where there is none.
+    pub fn new(progress: bool) -> Self {
+        let width = Table::new().width().unwrap_or(DEFAULT_WIDTH).clamp(60, 160);
+        Self { width, progress }
+    }
+
+    /// Prints a result.
+    pub fn print(&self, text: &str) -> Result<(), Stop> {
+        let mut out = std::io::stdout().lock();
+        let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        written.map_err(|error| match error.kind() {
+            ErrorKind::BrokenPipe => Stop::Unread,
+            _ => InputError::new("standard output", format!("cannot be written ({error})")).into(),
+        })
+    }
+
+    /// What tells the progress of one piece of work.
+    pub fn progress(&self) -> Progress {
+        let bar = std::io::stderr().is_terminal().then(bar);
+        Progress { lines: self.progress && bar.is_none(), bar, last: Mutex::new(String::new()) }
+    }
+
+    /// A table with these heads over its columns; those that begin with `>` hold numbers and are aligned right.
+    pub fn table<const N: usize>(&self, heads: [&str; N]) -> Table {
+        let mut table = Table::new();
+        table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(self.width);
+        for component in [TableComponent::HeaderLines, TableComponent::MiddleHeaderIntersections] {
+            table.set_style(component, '\u{2500}');
+        }
+        table.set_header(heads.map(|head| Cell::new(head.trim_start_matches('>'))));
+        for (column, head) in table.column_iter_mut().zip(heads) {
+            if head.starts_with('>') {
+                column.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        table
+    }
+
+    /// `text` in lines that fit, those after the first indented by `indent` blanks.
+    pub fn wrapped(&self, text: &str, indent: usize) -> String {
+        let (mut out, mut length) = (String::new(), 0);
+        for word in text.split(' ') {
+            let letters = word.chars().count();
+            if length > 0 && length + 1 + letters > usize::from(self.width) {
+                out.push('\n');
+                out.extend(std::iter::repeat_n(' ', indent));
+                length = indent;
+            } else if length > 0 {
+                out.push(' ');
+                length += 1;
+            }
+            out.push_str(word);
+            length += letters;
+        }
+        out
+    }
+}
+
+/// A table below its title, with blank lines around.
+pub(super) fn titled(title: &str, table: &Table) -> String {
+    format!("\n{title}\n\n{}\n", table.trim_fmt())
+}
+
+fn bar() -> ProgressBar {
+    // The template is a constant; a bar of the library's own style is no harm.
+    let style = ProgressStyle::with_template("{spinner} {msg} {wide_bar:.dim} {pos}/{len} {elapsed}");
+    let bar = ProgressBar::new(1).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(100));
+    bar
+}
+
+/// Tells the steps of one piece of work, and wipes them away when dropped.
+#[derive(Debug)]
+pub(super) struct Progress {
+    bar: Option<ProgressBar>,
+    /// Whether each step is a line of its own.
+    lines: bool,
+    last: Mutex<String>,
+}
+
+impl Progress {
+    /// Tells that `step` is being done, and how many of how many parts of it lie behind.
+    pub fn tell(&self, step: &str, done: usize, of: usize) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(step.to_owned());
+            bar.set_length(of as u64);
+            bar.set_position(done as u64);
+        }
+        if self.lines
+            && let Ok(mut last) = self.last.lock()
+            && *last != step
+        {
+            eprintln!("{step} ...");
+            step.clone_into(&mut last);
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_wrapped_between_words() {
+        let screen = Screen { width: 10, progress: false };
+        assert_eq!(screen.wrapped("one two three four", 2), "one two\n  three\n  four");
+        assert_eq!(screen.wrapped("", 2), "");
+    }
+
+    #[test]
+    fn tables_fit_the_terminal() {
+        let screen = Screen { width: 60, progress: false };
+        let mut table = screen.table(["name", ">value"]);
+        table.add_row(["x".repeat(10), "word ".repeat(40)]);
+        assert!(table.trim_fmt().lines().all(|line| line.chars().count() <= 60));
+    }
+}

@@ -1,0 +1,122 @@
+//! Diagnoses of recordings in which the generator concealed an effect, in laws and with integrators of its own.
+
+use rayon::ThreadPoolBuilder;
+use trueup::conceal::servo::{Excitation, Servo, ServoEffect};
+use trueup::conceal::{Column, Table};
+use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
+use trueup::sim2real::diagnose::{Outcome, Verdict, calibrate, diagnose};
+use trueup::sim2real::{Assembly, Measured, Recording, Seed};
+
+fn column(table: &Table, name: &str) -> Vec<f64> {
+    match table.columns().iter().find(|(other, _)| other == name) {
+        Some((_, Column::Real(values))) => values.clone(),
+        other => panic!("no column of numbers {name}: {other:?}"),
+    }
+}
+
+/// A recording of the generator, `rows` long.
+fn recording(effects: &[ServoEffect], excitation: Excitation, seed: u64, rows: usize) -> Recording<Commands> {
+    let table = Servo { rows, ..Servo::default() }.with(effects).record(excitation, Seed(seed));
+    let samples = column(&table, "q").into_iter().map(Some).collect();
+    Recording {
+        name: format!("{excitation:?}"),
+        time: column(&table, "t"),
+        stimulus: Commands(column(&table, "u")),
+        measured: vec![Measured { channel: "position".into(), unit: "rad".into(), samples }],
+    }
+}
+
+fn twin() -> Assembly<Joint> {
+    Assembly::new(Joint::new(Axis::Rotary, [0.11, 0.25, 2.7, 1.0], [0.2, 0.2, 0.2, 0.0]), MECHANISMS)
+}
+
+fn diagnosed(twin: &Assembly<Joint>, effects: &[ServoEffect], seed: u64) -> Outcome<Assembly<Joint>> {
+    let fitted = [recording(effects, Excitation::SinesAndSteps, seed, 3_000)];
+    let held_out = [recording(effects, Excitation::ChirpAndSteps, seed + 1, 3_000)];
+    diagnose(twin, &fitted, &held_out, Seed(1), &|_, _, _| ())
+}
+
+fn names(outcome: &Outcome<Assembly<Joint>>) -> Vec<String> {
+    let mut names: Vec<String> = outcome.diagnosis.effects.iter().map(|e| e.mechanism.clone()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn every_effect_of_the_generator_is_named() {
+    for (k, effect) in ServoEffect::TYPICAL.into_iter().enumerate() {
+        let outcome = diagnosed(&twin(), &[effect], 40 + 2 * k as u64);
+        assert_eq!(names(&outcome), [effect.mechanism()], "{:#?}", outcome.diagnosis);
+        assert_eq!(outcome.diagnosis.verdict, Verdict::Named, "{}", outcome.diagnosis.summary);
+        let fit = &outcome.diagnosis.fit[0];
+        assert!(fit.trued_rmse < 0.5 * fit.recalibrated_rmse, "{}: {fit:?}", effect.mechanism());
+        assert!(outcome.diagnosis.checks.placebo_p.unwrap() <= 0.01);
+    }
+}
+
+#[test]
+fn nothing_is_named_where_only_parameters_are_off() {
+    for seed in [70, 72, 74] {
+        let outcome = diagnosed(&twin(), &[], seed);
+        assert_eq!(outcome.diagnosis.verdict, Verdict::NoMismatch, "{:#?}", outcome.diagnosis);
+        assert!(outcome.diagnosis.effects.is_empty());
+        let fit = &outcome.diagnosis.fit[0];
+        assert!(fit.recalibrated_rmse < 1.3 * fit.noise_floor && fit.nominal_rmse > 3.0 * fit.noise_floor);
+    }
+}
+
+#[test]
+fn two_effects_are_both_named() {
+    let pair = [ServoEffect::TYPICAL[1], ServoEffect::TYPICAL[6]];
+    let mut expected = pair.map(|e| e.mechanism().to_owned());
+    expected.sort();
+    let outcome = diagnosed(&twin(), &pair, 80);
+    assert_eq!(names(&outcome), expected, "{:#?}", outcome.diagnosis);
+}
+
+/// With its law taken out of the registry, an effect must not be given another's name.
+#[test]
+fn an_effect_outside_the_registry_is_not_explained_away() {
+    for k in [0, 6] {
+        let effect = ServoEffect::TYPICAL[k];
+        let outcome = diagnosed(&twin().excluding(&[effect.mechanism().to_owned()]), &[effect], 90 + 2 * k as u64);
+        assert!(
+            matches!(outcome.diagnosis.verdict, Verdict::Unexplained | Verdict::NotExcited),
+            "{}: {:#?}",
+            effect.mechanism(),
+            outcome.diagnosis
+        );
+    }
+}
+
+#[test]
+fn the_same_bits_at_any_number_of_threads() {
+    let effect = [ServoEffect::TYPICAL[0]];
+    let with_threads = |threads| {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| diagnosed(&twin(), &effect, 100))
+    };
+    let one = with_threads(1);
+    for threads in [2, 5] {
+        let many = with_threads(threads);
+        assert_eq!(one.diagnosis, many.diagnosis);
+        assert_eq!(one.comparisons, many.comparisons);
+        assert_eq!(
+            one.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
+            many.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+        );
+    }
+}
+
+#[test]
+fn a_calibration_finds_the_parameters_behind_a_recording() {
+    let truth = Servo::default();
+    let fitted = [recording(&[], Excitation::SinesAndSteps, 110, 3_000)];
+    let calibration = calibrate(&twin(), &fitted, &[], Seed(1), &|_, _, _| ());
+    for (k, expected) in [truth.inertia, truth.viscous_friction, truth.gravity_torque].into_iter().enumerate() {
+        // The gain is not free here, so everything is known in units of it.
+        let expected = expected / truth.gain;
+        let (value, std) = (calibration.values[k], calibration.std[k]);
+        assert!((value - expected).abs() < 4.0 * std + 0.01 * expected, "{k}: {value} +- {std}, not {expected}");
+    }
+}
