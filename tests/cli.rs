@@ -348,8 +348,7 @@ fn the_demonstration_finds_what_was_concealed() {
         names
     };
     assert_eq!(found("servo"), ["coulomb_friction"]);
-    // What 120 ms cost is less than the rounding to a tick, by which no fit may pass for better.
-    assert_eq!(found("execution"), ["book_walk", "commission", "half_spread"]);
+    assert_eq!(found("execution"), ["book_walk", "command_delay", "commission", "half_spread"]);
     assert!(ran.out.find("Found missing").unwrap() < ran.out.find("What the generator had concealed").unwrap());
     assert_eq!(scene.run("demo").code, 2, "nothing is written over");
 }

@@ -82,7 +82,7 @@ impl Default for Exchange {
             volatility: 0.32,
             orders: 800,
             sizes: (20, 400),
-            latency: 0.12,
+            latency: 0.3,
             jitter: 0.0003,
             fees: Fees::OfNotional(0.4),
             concession: None,

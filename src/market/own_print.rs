@@ -39,14 +39,24 @@ pub fn own_print(
     }
 }
 
+/// Whether `prints` begin with the fills: each fill may be the sum of neighbouring prints at its price, for a tape shows a
+/// print for every resting order that was met, and many brokers one fill for each price.
 fn shows(prints: &[Print], side: Side, fills: &[Piece]) -> bool {
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs();
-    let one = |(print, fill): (&Print, &Piece)| {
-        print.aggressor.is_none_or(|aggressor| aggressor == side)
-            && close(print.size, fill.quantity)
-            && close(print.price, fill.price)
+    let mut prints = prints.iter();
+    let mut shown = |fill: &Piece| {
+        let mut left = fill.quantity;
+        while left > 1e-9 * fill.quantity {
+            let Some(print) = prints.next() else { return false };
+            let own = print.aggressor.is_none_or(|aggressor| aggressor == side) && close(print.price, fill.price);
+            if !own || print.size <= 0.0 {
+                return false;
+            }
+            left -= print.size;
+        }
+        left.abs() <= 1e-9 * fill.quantity
     };
-    !fills.is_empty() && prints.len() >= fills.len() && prints.iter().zip(fills).all(one)
+    !fills.is_empty() && fills.iter().all(&mut shown)
 }
 
 /// The delay between decision and own print the stamps show [s]: the median of `delays` [s], where at least 25 orders
@@ -96,6 +106,20 @@ mod tests {
         assert_eq!(find(&prints[5..], &[piece(5.0, 10.0)]), None, "it comes after the fill was reported");
         assert_eq!(find(&prints, &[piece(5.0, 10.0), piece(7.0, 10.2)]), None);
         assert_eq!(find(&prints, &[]), None);
+    }
+
+    #[test]
+    fn a_fill_may_be_the_sum_of_prints() {
+        let sell = Some(Side::Sell);
+        let buy = Some(Side::Buy);
+        let prints = [
+            print(2_000, 10.0, 3.0, sell),
+            print(3_000, 10.0, 2.0, buy),
+            print(3_000, 10.0, 3.0, buy),
+            print(3_000, 10.1, 7.0, buy),
+        ];
+        assert_eq!(find(&prints, &[piece(5.0, 10.0), piece(7.0, 10.1)]), Some(3_000));
+        assert_eq!(find(&prints, &[piece(4.0, 10.0)]), None, "no prints add up to it");
     }
 
     #[test]

@@ -41,7 +41,7 @@ fn fills_are_at_prices_displayed_just_before_arrival() {
     for order in &day.orders {
         let fills = fills_of(&day, order);
         let latency = fills[0].filled_at - order.decided_at;
-        assert!((120_000_000..121_000_000).contains(&latency), "{latency} ns");
+        assert!((300_000_000..301_000_000).contains(&latency), "{latency} ns");
         assert_eq!(fills.iter().map(|fill| fill.quantity).sum::<i64>(), order.quantity);
         let book = offered(before(&day, fills[0].filled_at), order.side);
         let mut left = order.quantity;

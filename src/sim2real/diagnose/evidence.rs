@@ -67,6 +67,11 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
         Self { free_run, compared, held_out: apart, how, weights, rounding, window }
     }
 
+    /// Variance of the rounding of `channel`, in units of its noise.
+    pub(super) fn rounding_of(&self, channel: &str) -> f64 {
+        self.weights.iter().position(|w| w.channel == channel).map_or(0.0, |k| self.rounding[k])
+    }
+
     /// The initial states with which parts are compared: windows start wherever fits best.
     pub(super) fn initial_state<T: Simulator<Stimulus = S>>(&self, problem: &Problem<'_, T>) -> State {
         if self.window.is_some() { State::unknown(problem) } else { State::estimated(problem) }

@@ -99,7 +99,7 @@ impl<T: Twin> Inquiry<'_, T> {
     }
 
     fn weighed(&self, twin: T, added: Vec<usize>, fit: Fit, blocks: &[Block]) -> Hypothesis<T> {
-        let misfits = channel_misfits(fit.residual.as_slice(), blocks);
+        let misfits = channel_misfits(fit.residual.as_slice(), blocks, |channel| self.evidence.rounding_of(channel));
         Hypothesis { twin, added, fit, misfits }
     }
 

@@ -167,7 +167,7 @@ pub fn calibrate<T: Twin>(
 fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, fit: &Fit) -> Vec<f64> {
     let parts = if inquiry.evidence.window.is_some() { &inquiry.evidence.free_run } else { &inquiry.evidence.compared };
     let blocks = inquiry.problem(&hypothesis.twin, parts).blocks();
-    let factor = whiteness::channel_misfits(fit.residual.as_slice(), &blocks)
+    let factor = whiteness::channel_misfits(fit.residual.as_slice(), &blocks, |c| inquiry.evidence.rounding_of(c))
         .iter()
         .map(|m| (m.sum_of_squares / m.count.max(1) as f64).max(1.0) * m.autocorrelation_time.max(1.0))
         .fold(1.0, f64::max)

@@ -191,8 +191,7 @@ pub(super) fn gain<T: Twin>(inquiry: &Inquiry<'_, T>, null: &Hypothesis<T>, alte
     let mut gain = 0.0;
     let mut effective = 1.0;
     for (null, other) in null.misfits.iter().zip(&alternative.misfits) {
-        let place = inquiry.evidence.weights.iter().position(|w| w.channel == other.channel);
-        let rounding = place.map_or(0.0, |k| inquiry.evidence.rounding[k]).max(1e-9) * other.count as f64;
+        let rounding = inquiry.evidence.rounding_of(&other.channel).max(1e-9) * other.count as f64;
         gain += other.effective() * ((null.sum_of_squares + rounding) / (other.sum_of_squares + rounding)).ln();
         effective += other.effective();
     }

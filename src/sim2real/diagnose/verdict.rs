@@ -292,7 +292,8 @@ fn summary<T: Twin>(inquiry: &Inquiry<'_, T>, verdict: Verdict, effects: &[Effec
     };
     let names = listed(&effects.iter().map(|e| title(&e.mechanism)).collect::<Vec<_>>());
     let name = inquiry.twin.name();
-    let best = findings.fits.iter().max_by(|a, b| a.improvement_ci95[0].total_cmp(&b.improvement_ci95[0]));
+    // The first channel is the one a twin is about; others speak where it gained nothing.
+    let best = findings.fits.iter().find(|f| f.improvement_ci95[0] > 0.0).or(findings.fits.first());
     let gained = best.map_or_else(String::new, |f| {
         format!(
             "the held-out error of {} falls from {:.3e} to {:.3e} {} (noise floor {:.1e})",

@@ -22,8 +22,11 @@ impl ChannelMisfit {
     }
 }
 
-/// The misfit of every channel.
-pub(super) fn channel_misfits(residual: &[f64], blocks: &[Block]) -> Vec<ChannelMisfit> {
+/// The misfit of every channel; `rounding` gives the variance of a channel's rounding, in units of its noise.
+///
+/// Rounding is white, and it is there however well a model does: residuals far below it, which may all be the same in the
+/// last bits, are no less independent for that.
+pub(super) fn channel_misfits(residual: &[f64], blocks: &[Block], rounding: impl Fn(&str) -> f64) -> Vec<ChannelMisfit> {
     let mut channels: Vec<&str> = blocks.iter().map(|b| b.channel.as_str()).collect();
     channels.dedup();
     channels.sort_unstable();
@@ -32,11 +35,15 @@ pub(super) fn channel_misfits(residual: &[f64], blocks: &[Block]) -> Vec<Channel
         .into_iter()
         .map(|channel| {
             let series = of_channel(residual, blocks, channel);
+            let sum_of_squares: f64 = series.iter().flat_map(|s| s.iter()).map(|r| r * r).sum();
+            let count: usize = series.iter().map(|s| s.len()).sum();
+            let white = rounding(channel) * count as f64;
+            let coloured = if sum_of_squares > 0.0 { sum_of_squares / (sum_of_squares + white) } else { 0.0 };
             ChannelMisfit {
                 channel: channel.to_owned(),
-                sum_of_squares: series.iter().flat_map(|s| s.iter()).map(|r| r * r).sum(),
-                count: series.iter().map(|s| s.len()).sum(),
-                autocorrelation_time: autocorrelation_time(&series),
+                sum_of_squares,
+                count,
+                autocorrelation_time: 1.0 + coloured * (autocorrelation_time(&series) - 1.0),
             }
         })
         .collect()
