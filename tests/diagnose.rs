@@ -1,4 +1,5 @@
 //! Diagnoses of recordings in which the generator concealed an effect, in laws and with integrators of its own.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails where a value is missing")]
 
 use rayon::ThreadPoolBuilder;
 use trueup::conceal::servo::{Excitation, Servo, ServoEffect};

@@ -276,7 +276,7 @@ fn trajectories_need_a_time_that_goes_on_and_a_command_throughout() {
       hint: this column must be complete: fill the cell or drop the row
     ");
     insta::assert_snapshot!(read("t,u,q\n0,0,0\n1,NaN,0\n"), @"
-    a.csv: row 3, column `u`: expected a number, found an empty cell
+    a.csv: row 3, column `u`: expected a number, found NaN
       hint: this column must be complete: fill the cell or drop the row
     ");
     insta::assert_snapshot!(read("t,u,q\n0,0,0\n"), @"

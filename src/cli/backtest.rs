@@ -107,5 +107,5 @@ fn told(outputs: &RunOutputs, screen: &Screen) -> String {
     for metric in &outputs.page.metrics {
         table.add_row([metric.name.clone(), metric.value.clone().unwrap_or_else(|| UNDEFINED.to_owned())]);
     }
-    format!("{}\n\n{}\n", screen.wrapped(&outputs.page.title, 2), table.trim_fmt())
+    format!("{}\n\n{}\n", screen.wrapped("", &outputs.page.title), table.trim_fmt())
 }

@@ -84,7 +84,7 @@ impl Calibrate {
         match &self.out {
             Some(path) => {
                 let folder = path.parent().unwrap_or(Path::new(""));
-                let name = self.twin.file_name().unwrap_or_default().to_string_lossy();
+                let name = self.twin.file_name().unwrap_or_default().to_string_lossy().replace(char::is_control, " ");
                 let head = format!("# Made by `trueup calibrate` from {name}.\n");
                 write_file(path, (head + &twin.document(&file).render(folder)).as_bytes(), overwrite)?;
                 if !self.json {

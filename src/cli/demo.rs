@@ -104,7 +104,7 @@ fn heading(command: &str) -> String {
 
 fn found(screen: &Screen, diagnosed: &Diagnosed) -> String {
     let diagnosis = &diagnosed.diagnosis;
-    let mut text = format!("{}\n", screen.wrapped(&headline(diagnosis), 2));
+    let mut text = format!("{}\n", headline(screen, diagnosis));
     text += &format!("\nFound missing: {}\n", effect_names(diagnosis));
     text + &titled(&format!("Errors on held-out data ({})", diagnosis.held_out), &errors(screen, &diagnosis.fit))
 }

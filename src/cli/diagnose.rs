@@ -129,10 +129,12 @@ pub(super) fn write(
 ) -> Result<Vec<PathBuf>, Stop> {
     let diagnosis = &diagnosed.diagnosis;
     let page = diagnosis_page(diagnosis, &figures(diagnosed.comparisons))?;
-    let name = file.document().path().file_name().unwrap_or_default().to_string_lossy();
+    let name = file.document().path().file_name().unwrap_or_default().to_string_lossy().replace(char::is_control, " ");
+    // A sentence with line breaks would leave the comment.
+    let summary = diagnosis.summary.replace(char::is_control, " ");
     let trued = format!(
-        "# Made by `trueup diagnose` from {name}. {}\n{}",
-        headline(diagnosis).replace('\n', " "),
+        "# Made by `trueup diagnose` from {name}. {}: {summary}\n{}",
+        diagnosis.verdict,
         diagnosed.trued.document(file).render(folder)
     );
     let mut output = OutputFolder::create(folder, overwrite)?;

@@ -59,16 +59,17 @@ impl Screen {
         table
     }
 
-    /// `text` in lines that fit, those after the first indented by `indent` blanks.
-    pub fn wrapped(&self, text: &str, indent: usize) -> String {
-        let (mut out, mut length) = (String::new(), 0);
-        for word in text.split(' ') {
+    /// `text` in lines that fit: the first after `head`, those after it indented as far as that is long.
+    pub fn wrapped(&self, head: &str, text: &str) -> String {
+        let indent = head.chars().count();
+        let (mut out, mut length) = (head.to_owned(), indent);
+        for (k, word) in text.split(' ').enumerate() {
             let letters = word.chars().count();
-            if length > 0 && length + 1 + letters > usize::from(self.width) {
+            if k > 0 && length + 1 + letters > usize::from(self.width) {
                 out.push('\n');
                 out.extend(std::iter::repeat_n(' ', indent));
                 length = indent;
-            } else if length > 0 {
+            } else if k > 0 {
                 out.push(' ');
                 length += 1;
             }
@@ -134,8 +135,8 @@ mod tests {
     #[test]
     fn text_is_wrapped_between_words() {
         let screen = Screen { width: 10, progress: false };
-        assert_eq!(screen.wrapped("one two three four", 2), "one two\n  three\n  four");
-        assert_eq!(screen.wrapped("", 2), "");
+        assert_eq!(screen.wrapped("- ", "one two three four"), "- one two\n  three\n  four");
+        assert_eq!(screen.wrapped("", "one two three"), "one two\nthree");
     }
 
     #[test]

@@ -307,13 +307,23 @@ impl Table {
         self.error(name, row, message).found_text(text).hint(hint)
     }
 
+    /// What stands in a cell that counts as having no value.
+    fn hole(&self, name: &str, row: usize) -> &'static str {
+        let nan = match self.column(name) {
+            Ok(Cells::Text(mut texts)) => texts.nth(row).is_some_and(|text| text.trim().eq_ignore_ascii_case("nan")),
+            Ok(Cells::Typed(Column::Floats(values))) => values.get(row).copied().flatten().is_some_and(f64::is_nan),
+            _ => false,
+        };
+        if nan { "NaN" } else { "an empty cell" }
+    }
+
     fn complete<T>(&self, name: &str, cells: Vec<Option<T>>, what: &str) -> Result<Vec<T>, InputError> {
         let hole = cells.iter().position(Option::is_none);
         match hole {
             None => Ok(cells.into_iter().flatten().collect()),
             Some(row) => Err(self
                 .error(name, row, format!("expected {what}"))
-                .found("an empty cell")
+                .found(self.hole(name, row))
                 .hint("this column must be complete: fill the cell or drop the row")),
         }
     }

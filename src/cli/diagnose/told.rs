@@ -12,13 +12,13 @@ use crate::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, Score};
 const RANKED: usize = 6;
 
 /// The verdict and its sentence.
-pub(in crate::cli) fn headline(diagnosis: &Diagnosis) -> String {
-    format!("{}: {}", diagnosis.verdict, diagnosis.summary)
+pub(in crate::cli) fn headline(screen: &Screen, diagnosis: &Diagnosis) -> String {
+    screen.wrapped(&format!("{}: ", diagnosis.verdict), &diagnosis.summary)
 }
 
 /// Everything a person wants to read of a diagnosis, most important first.
 pub(super) fn diagnosis(screen: &Screen, diagnosis: &Diagnosis) -> String {
-    let mut text = format!("{}\n", screen.wrapped(&headline(diagnosis), 2));
+    let mut text = format!("{}\n", headline(screen, diagnosis));
     if !diagnosis.effects.is_empty() {
         text += &titled("What is missing", &effects(screen, &diagnosis.effects));
     }
@@ -143,10 +143,10 @@ fn checks(screen: &Screen, diagnosis: &Diagnosis) -> String {
         text += &format!("  at a bound: {}\n", checks.at_bound.join(", "));
     }
     for note in &checks.notes {
-        text += &format!("{}\n", screen.wrapped(&format!("  - {note}"), 4));
+        text += &format!("{}\n", screen.wrapped("  - ", note));
     }
     if let Some(next) = &diagnosis.next_experiment {
-        text += &format!("\n{}\n", screen.wrapped(&format!("Next experiment: {}.", next.what), 2));
+        text += &format!("\n{}\n", screen.wrapped("Next experiment: ", &next.what));
     }
     text
 }
