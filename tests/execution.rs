@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use trueup::market::{
-    Bar, Execution, Instrument, Level, LogError, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog, OrderType,
-    PriceAssumption, Price, Print, Quotes, Side, Tape,
+    Bar, Execution, Instrument, Level, LogError, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog, OrderType, Price,
+    PriceAssumption, Print, Quotes, Side, Tape,
 };
 use trueup::sim2real::{
     Assembly, Candidate, Plant, Recording, Seed, Simulator, Thetas, Timestamp, Twin, check_mechanism, check_plant,
