@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::io::{InputError, OutputFolder, Overwrite, RunFile};
+use crate::io::{InputError, OutputFolder, Overwrite, RunFile, hint_among};
 use crate::market::{Backtest, Record, RunOutputs, Session, Strategy, explained, prepare_run};
 use crate::report::quantity::UNDEFINED;
-use crate::strategies;
+use crate::strategies::{self, StrategyError};
 
 use super::screen::{Progress, Screen};
 use super::stop::{Outcome, Stop};
@@ -74,12 +74,27 @@ impl Run {
 fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
     let mut table: toml::Table = file.strategy_settings()?;
     table.insert("kind".to_owned(), toml::Value::String(file.strategy.clone()));
-    strategies::build(&table).map_err(|error| {
-        let text = error.to_string();
-        let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
-        let error = file.error(&["strategy"], message.trim_start_matches("[strategy] "));
-        if hint.is_empty() { error } else { error.hint(hint) }
-    })
+    strategies::build(&table).map_err(|error| explained_strategy(file, &error))
+}
+
+/// The error of a strategy at its place in the run.
+fn explained_strategy(file: &RunFile, error: &StrategyError) -> InputError {
+    let text = error.to_string();
+    let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
+    let message = message.trim_start_matches("[strategy] ");
+    match error {
+        StrategyError::NoKind(_) | StrategyError::Unknown { .. } => file.error(&["strategy", "kind"], message).hint(hint),
+        StrategyError::Value { parameter, .. } => file.error(&["strategy", parameter], message).hint(hint),
+        StrategyError::Parameter { kind, message, parameters } => {
+            let word = message.split('`').nth(1).unwrap_or_default();
+            let known: Vec<&str> = parameters.split(", ").collect();
+            if message.starts_with("unknown field") {
+                let error = file.error(&["strategy", word], format!("`{kind}` has no parameter `{word}`"));
+                return error.maybe_hint(hint_among(word, &known));
+            }
+            file.error(&["strategy", word], format!("{kind}: {message}")).hint(hint)
+        }
+    }
 }
 
 /// Events between two looks at the progress.
