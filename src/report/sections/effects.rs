@@ -64,6 +64,6 @@ fn row(effect: &Effect) -> Value {
         confidence => percent(effect.confidence),
         parameters => parameters,
         rivals => if rivals.is_empty() { "none".to_string() } else { rivals.join(", ") },
-        location => effect.location.as_deref().unwrap_or("throughout"),
+        location => effect.location.as_deref().unwrap_or("–"),
     }
 }

@@ -296,8 +296,12 @@ fn summary<T: Twin>(inquiry: &Inquiry<'_, T>, verdict: Verdict, effects: &[Effec
     let best = findings.fits.iter().find(|f| f.improvement_ci95[0] > 0.0).or(findings.fits.first());
     let gained = best.map_or_else(String::new, |f| {
         format!(
-            "the held-out error of {} falls from {:.3e} to {:.3e} {} (noise floor {:.1e})",
-            f.channel, f.recalibrated_rmse, f.trued_rmse, f.unit, f.noise_floor
+            "the held-out error of {} falls from {} to {} {} (noise floor {})",
+            f.channel,
+            figure(f.recalibrated_rmse),
+            figure(f.trued_rmse),
+            f.unit,
+            figure(f.noise_floor)
         )
     });
     match verdict {
@@ -328,6 +332,15 @@ fn summary<T: Twin>(inquiry: &Inquiry<'_, T>, verdict: Verdict, effects: &[Effec
     }
 }
 
+/// A number to three digits, as a sentence bears it.
+fn figure(value: f64) -> String {
+    let magnitude = value.abs().log10().floor();
+    if value == 0.0 || !(-4.0..6.0).contains(&magnitude) {
+        return if value == 0.0 { "0".to_owned() } else { format!("{value:.2e}") };
+    }
+    format!("{value:.*}", (2.0 - magnitude).max(0.0) as usize)
+}
+
 fn shape(findings: &Findings) -> String {
     findings.dependence.as_ref().map_or_else(String::new, |d| format!("; what is left depends on the {}", d.on))
 }
@@ -337,5 +350,16 @@ fn listed(names: &[String]) -> String {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
         [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_have_three_digits() {
+        let figures = [0.0648, 0.00425, 3.588, 59.75, 14_233.0, 0.0, 2.66e-8].map(figure);
+        assert_eq!(figures, ["0.0648", "0.00425", "3.59", "59.8", "14233", "0", "2.66e-8"]);
     }
 }
