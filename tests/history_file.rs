@@ -80,7 +80,7 @@ fn bars_that_cannot_be_name_row_column_value_and_remedy() {
         let error = fault(&[good.clone(), bad]);
         assert!(error.contains(place) && error.contains("hint:"), "{error}");
     }
-    assert!(fault(&[good.clone()]).contains("interval = \"1m\""));
+    assert!(fault(std::slice::from_ref(&good)).contains("interval = \"1m\""));
     assert!(read_bars(&good, &bars_format(), Some(MINUTE)).is_ok());
     let hours = read_bars(&(good.clone() + &row(1, "10,12,9,11,5")), &bars_format(), Some(60 * MINUTE)).unwrap_err();
     assert!(hours.contains("most bars are 60 s apart, but `interval` says 3600 s"), "{hours}");

@@ -145,7 +145,7 @@ pub(super) fn diagnosis<T: Twin>(
             placebo_p: findings.placebo_p,
             at_bound: findings.trued.at_bound.clone(),
             tried: names.len(),
-            notes: notes(inquiry, findings),
+            notes: notes(inquiry, selected, findings),
         },
         next_experiment: next_experiment(verdict, &effects),
         scores: selection.scores.clone(),
@@ -249,10 +249,18 @@ fn parameters<T: Twin>(
         .collect()
 }
 
-fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> Vec<String> {
+fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> Vec<String> {
     let parts = inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out);
     let mut notes: Vec<String> = parts.flat_map(|p| inquiry.twin.notes(p.recording)).collect();
     notes.dedup();
+    let smooth = selected.fit.jacobian.ncols();
+    if selected.fit.rank < smooth {
+        notes.push(format!(
+            "the recordings determine {} of {smooth} combinations of the parameters; what the twin says of their uncertainty \
+             decides the rest",
+            selected.fit.rank
+        ));
+    }
     if let Some(seconds) = inquiry.evidence.window {
         notes.push(format!(
             "this plant does not forget where it started, so hypotheses were compared on windows of {seconds:.2} s, each \

@@ -5,11 +5,12 @@ use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn};
 
 use super::bounds::Bounded;
-use super::problem::{Problem, State};
+use super::problem::{DIFFERENCE, Problem, State};
 use crate::sim2real::Simulator;
 
-/// Directions in which the data move the parameters less than this part of the strongest count as not determined.
-const RANK_TOLERANCE: f64 = 1e-7;
+/// Directions in which the data move the parameters less than this part of the strongest count as not determined:
+/// derivatives are known no better than the step of their finite differences.
+const RANK_TOLERANCE: f64 = 3.0 * DIFFERENCE;
 
 /// A fit ends when a step would lower the objective by less than this part of it: a thousandth of what the weakest
 /// evidence that counts is worth.
@@ -22,6 +23,9 @@ pub struct Fit {
     pub values: Vec<f64>,
     /// Their standard deviations as the noise alone makes them; 0 for fixed ones, infinite for those not determined.
     pub std: Vec<f64>,
+    /// Covariance of the free parameters, in the order of `free`, as noise and priors make it; none where neither data nor
+    /// priors determine them all.
+    pub covariance: Option<DMatrix<f64>>,
     /// Numbers of the parameters that were free.
     pub free: Vec<usize>,
     /// Initial states of all parts.
@@ -186,11 +190,12 @@ fn describe<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usi
     for (i, k) in free.iter().enumerate() {
         information[(i, i)] += (prior_weight(problem, *k) * scales[i]).powi(2);
     }
+    let covariance = if free.is_empty() { None } else { information.try_inverse() }
+        .map(|inverse| DMatrix::from_fn(free.len(), free.len(), |i, j| inverse[(i, j)] * scales[i] * scales[j]));
     let mut std = vec![0.0; theta.len()];
-    let covariance = if free.is_empty() { None } else { information.try_inverse() };
     for (i, k) in free.iter().enumerate() {
         let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]);
-        std[*k] = if variance >= 0.0 { variance.sqrt() * scales[i] } else { f64::INFINITY };
+        std[*k] = if variance >= 0.0 { variance.sqrt() } else { f64::INFINITY };
     }
     let at_bound = free
         .iter()
@@ -200,6 +205,7 @@ fn describe<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usi
     Fit {
         values: theta,
         std,
+        covariance,
         free: free.to_vec(),
         state,
         residual: evaluation.residual,

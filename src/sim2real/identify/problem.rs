@@ -10,7 +10,7 @@ use crate::sim2real::{ChannelWeight, Parameter, Part, Seed, Simulator, Thetas};
 
 /// Step of a finite difference, as a part of a parameter's scale: wide enough to smooth over the moments at which dry
 /// friction lets go, which move by whole steps of integration.
-const DIFFERENCE: f64 = 1e-4;
+pub(super) const DIFFERENCE: f64 = 1e-4;
 
 /// What a residual that is not a number is taken for: worse than any other, and finite.
 const DIVERGED: f64 = 1e8;
