@@ -110,7 +110,11 @@ impl Diagnose {
         } else if !self.json {
             text += "\nNothing was written; --out DIR writes diagnosis.json, trued.toml and report.html.\n";
         }
-        screen.print(&text)?;
+        // A reader who has seen enough does not change what was found.
+        match screen.print(&text) {
+            Ok(()) | Err(Stop::Unread) => {}
+            Err(stop) => return Err(stop),
+        }
         Ok(if self.fail_on.iter().any(|on| on.holds(verdict)) { Outcome::Finding } else { Outcome::Done })
     }
 }

@@ -209,6 +209,20 @@ impl Plant for Joint {
         ]
     }
 
+    /// Standard deviation of the rounding of a sensor that counts in steps: `step / sqrt(12)` (Widrow & Kollár,
+    /// *Quantization Noise* (2008), section 5.4), where nine in ten changes of the signal are whole multiples of the
+    /// smallest.
+    fn resolution(&self, recording: &Recording<Commands>, channel: &str) -> f64 {
+        let Some(measured) = recording.channel(channel) else { return 0.0 };
+        let changes = measured.samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
+        let largest = changes.clone().fold(0.0, f64::max);
+        // Differences of rounded numbers are not quite whole multiples: the last bits differ.
+        let changes: Vec<f64> = changes.filter(|change| *change > 1e-9 * largest).collect();
+        let step = changes.iter().copied().fold(f64::INFINITY, f64::min);
+        let whole = changes.iter().filter(|change| ((**change / step) - (**change / step).round()).abs() < 1e-3).count();
+        if !changes.is_empty() && 10 * whole >= 9 * changes.len() { step / 12.0_f64.sqrt() } else { 0.0 }
+    }
+
     fn unit(&self, declared: &str) -> String {
         let declared = match declared {
             "output" => "rad",
@@ -363,5 +377,16 @@ mod tests {
             }
         }
         assert!(worst < 2e-5, "{worst} rad");
+    }
+
+    #[test]
+    fn a_sensor_that_counts_is_no_better_than_its_step() {
+        let step = 2.0 * std::f64::consts::PI / 4096.0;
+        let mut recording = swing(2_000);
+        let counted = |t: f64| ((0.05 * (3.1 * t).sin()) / step).round() * step;
+        recording.measured[0].samples = recording.time.iter().map(|t| Some(counted(*t))).collect();
+        let resolution = arm().resolution(&recording, "position");
+        assert!((resolution / (step / 12.0_f64.sqrt()) - 1.0).abs() < 1e-6, "{resolution}");
+        assert_eq!(arm().resolution(&swing(2_000), "position"), 0.0);
     }
 }

@@ -99,11 +99,11 @@ impl Parameter {
             .unwrap_or(1.0)
     }
 
-    /// Whether `value` lies within a thousandth of the distance between the bounds from one of them, or, at one
-    /// bound only, within a thousandth of its scale.
+    /// Whether `value` lies within a thousandth of its scale, or of the distance between the bounds where that is less, from
+    /// a bound.
     #[must_use]
     pub fn at_bound(&self, value: f64) -> bool {
-        let span = if self.lower.is_finite() && self.upper.is_finite() { self.upper - self.lower } else { self.scale() };
+        let span = (self.upper - self.lower).min(self.scale());
         value - self.lower <= 1e-3 * span || self.upper - value <= 1e-3 * span
     }
 }
@@ -175,7 +175,7 @@ mod tests {
     fn scale_is_never_zero_and_bounds_are_seen() {
         let torque = Parameter::new("torque", "N m", 0.0).within(0.0, 10.0).starting_at(&[0.1]);
         assert_eq!(torque.scale(), 0.1);
-        assert!(torque.at_bound(0.001) && torque.at_bound(9.999) && !torque.at_bound(0.5));
+        assert!(torque.at_bound(0.000_05) && torque.at_bound(9.999_99) && !torque.at_bound(0.5));
         assert!(Parameter::new("free", "", 0.0).scale() > 0.0);
         assert!(!Parameter::new("free", "", 0.0).at_bound(0.0));
     }

@@ -154,7 +154,7 @@ pub fn calibrate<T: Twin>(
     let comparisons = prove::compared(&contest, &evidence, seed);
     Calibration {
         std: inflated(&inquiry, &hypothesis, &fit),
-        at_bound: fit.at_bound,
+        at_bound: fit.at_bound.iter().map(|k| twin.parameters()[*k].name.clone().into_owned()).collect(),
         values: fit.values,
         fit: prove::channel_fits(&comparisons, &evidence.weights, seed),
         held_out: evidence.how.clone(),

@@ -14,6 +14,7 @@ pub fn channel_weights<S: Simulator>(simulator: &S, recordings: &[Recording<S::S
         .filter_map(|channel| {
             let measured: Vec<(&Recording<S::Stimulus>, &Measured)> =
                 recordings.iter().filter_map(|r| Some((r, r.channel(channel.name)?))).collect();
+            // A channel that never moves says nothing of its noise, nor of anything else.
             let floors: Vec<f64> = measured.iter().map(|(r, m)| floor(simulator, r, m)).filter(|f| *f > 0.0).collect();
             (!floors.is_empty()).then(|| ChannelWeight { channel: channel.name.to_owned(), noise: median(floors) })
         })
@@ -30,7 +31,8 @@ fn floor<S: Simulator>(simulator: &S, recording: &Recording<S::Stimulus>, measur
     };
     let mean = present.iter().sum::<f64>() / present.len().max(1) as f64;
     let spread = (present.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / present.len().max(1) as f64).sqrt();
-    scatter.max(rounding).max(SMALLEST * spread).max(if present.is_empty() { 0.0 } else { f64::MIN_POSITIVE })
+    let moves = spread > 0.0 || simulator.clock() == Clock::Event;
+    if moves && !present.is_empty() { scatter.max(rounding).max(SMALLEST * spread) } else { 0.0 }
 }
 
 /// Standard deviation of white noise on a smooth signal, from the median absolute fourth difference.

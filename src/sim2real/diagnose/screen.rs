@@ -63,8 +63,9 @@ impl Ground {
 
 /// An orthonormal basis of the columns' span.
 fn orthonormal(columns: DMatrix<f64>) -> DMatrix<f64> {
-    if columns.ncols() == 0 {
-        return columns;
+    // Of nothing there is no decomposition to ask for.
+    if columns.is_empty() {
+        return DMatrix::zeros(columns.nrows(), 0);
     }
     let svd = columns.svd(true, false);
     let largest = svd.singular_values.max();

@@ -86,8 +86,8 @@ fn cut<'a>(order: &'a [usize], by: &[f64]) -> Vec<&'a [usize]> {
 
 /// What is left of the first channel in a stretch of a recording.
 pub(super) struct Left {
-    /// Name of the recording.
-    pub recording: String,
+    /// What tells its recording from others.
+    pub recording: usize,
     /// Residuals, in units of the noise.
     pub residual: Vec<f64>,
     /// The rows they belong to.
@@ -98,12 +98,18 @@ pub(super) struct Left {
 ///
 /// For sampled signals, whose residuals depend on one another: noise, however coloured, is not foretold on data the
 /// regression has not seen; missing physics is. Each covariate enters with its square, its sign and its past.
-pub(super) fn foretold(fitted: &[Left], held_out: &[Left], covariates: &BTreeMap<String, Vec<Covariate>>) -> f64 {
+pub(super) fn foretold(fitted: &[Left], held_out: &[Left], covariates: &BTreeMap<usize, Vec<Covariate>>) -> f64 {
     let (Some(train), Some(test)) = (stack(fitted, covariates), stack(held_out, covariates)) else { return 0.0 };
     let (design, target) = train;
     let center = design.row_mean();
-    let spread: Vec<f64> = design.column_iter().map(|c| c.variance().sqrt().max(1e-12)).collect();
-    let standard = |m: &DMatrix<f64>| DMatrix::from_fn(m.nrows(), m.ncols(), |i, k| (m[(i, k)] - center[k]) / spread[k]);
+    let spread: Vec<f64> = design.column_iter().map(|c| c.variance().sqrt()).collect();
+    // What did not vary while it was learnt from says nothing, however it varies later.
+    let standard = |m: &DMatrix<f64>| {
+        DMatrix::from_fn(m.nrows(), m.ncols(), |i, k| {
+            let constant = spread[k] <= 1e-9 * center[k].abs().max(1e-12);
+            if constant { 0.0 } else { (m[(i, k)] - center[k]) / spread[k] }
+        })
+    };
     let x = standard(&design);
     let mut information = x.tr_mul(&x);
     let ridge = 1e-2 * x.nrows() as f64;
@@ -123,7 +129,7 @@ const ROWS: usize = 6_000;
 /// Lags, in rows, at which covariates enter the regression: what acts inside a plant shows in its output for a while.
 const LAGS: [usize; 7] = [0, 6, 15, 30, 60, 100, 160];
 
-fn stack(pieces: &[Left], covariates: &BTreeMap<String, Vec<Covariate>>) -> Option<(DMatrix<f64>, DVector<f64>)> {
+fn stack(pieces: &[Left], covariates: &BTreeMap<usize, Vec<Covariate>>) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let mut target = Vec::new();
     // Some thousands of rows say as much as all of a slow signal.

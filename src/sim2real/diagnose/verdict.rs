@@ -1,6 +1,6 @@
 //! The verdict, and the words for it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::diagnosis::{
     ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Verdict,
@@ -12,7 +12,7 @@ use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
 use super::whiteness;
 use crate::sim2real::identify::Fit;
-use crate::sim2real::{Clock, Covariate, Part, Twin};
+use crate::sim2real::{Clock, Covariate, Part, Recording, Twin};
 
 /// A remainder above this part of the first misfit is more than an error of form.
 const FORM_ERROR: f64 = 0.10;
@@ -103,17 +103,22 @@ pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<
         let of_first = blocks.into_iter().filter(|b| Some(&b.channel) == first.as_ref());
         of_first
             .map(|b| Left {
-                recording: parts[b.part].recording.name.clone(),
+                recording: identity(parts[b.part].recording),
                 residual: residual.as_slice()[b.range].to_vec(),
                 rows: b.rows,
             })
             .collect()
     };
-    let mut covariates: BTreeMap<String, Vec<Covariate>> = BTreeMap::new();
+    let mut covariates: BTreeMap<usize, Vec<Covariate>> = BTreeMap::new();
     for part in inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out) {
-        covariates.entry(part.recording.name.clone()).or_insert_with(|| inquiry.twin.covariates(part.recording));
+        covariates.entry(identity(part.recording)).or_insert_with(|| inquiry.twin.covariates(part.recording));
     }
     regression(&left(&inquiry.evidence.compared), &left(&held_out), &covariates)
+}
+
+/// What tells a recording from others: two may well have the same name.
+fn identity<S>(recording: &Recording<S>) -> usize {
+    std::ptr::from_ref(recording) as usize
 }
 
 /// The whole result.
@@ -143,7 +148,7 @@ pub(super) fn diagnosis<T: Twin>(
             adequacy: whiteness::adequacy(selected.fit.residual.as_slice(), &blocks),
             remainder: findings.remainder,
             placebo_p: findings.placebo_p,
-            at_bound: findings.trued.at_bound.clone(),
+            at_bound: at_bound(inquiry, selected, findings),
             tried: names.len(),
             notes: notes(inquiry, selected, findings),
         },
@@ -153,6 +158,17 @@ pub(super) fn diagnosis<T: Twin>(
         held_out: inquiry.evidence.how.clone(),
         effects,
     }
+}
+
+/// The parameters that ended at a bound, those of mechanisms behind their mechanism's id.
+fn at_bound<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> Vec<String> {
+    let own = inquiry.twin.parameters().len();
+    let added = selected.added.iter().flat_map(|number| {
+        let candidate = &inquiry.candidates[*number];
+        candidate.form.parameters.iter().map(|p| format!("{}.{}", candidate.about.name, p.name))
+    });
+    let names = selected.twin.parameters()[..own].iter().map(|p| p.name.clone().into_owned()).chain(added);
+    names.enumerate().filter(|(k, _)| findings.trued.at_bound.contains(k)).map(|(_, name)| name).collect()
 }
 
 fn structured(findings: &Findings) -> bool {
@@ -169,7 +185,7 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
         return match left_over || !within(&selection.selected, FAR_ABOVE_THE_NOISE) {
-            _ if rows < FEWEST_ROWS && !within(&selection.selected, AT_THE_NOISE) => Verdict::NotExcited,
+            _ if rows == 0 || (rows < FEWEST_ROWS && !within(&selection.selected, AT_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
             false => Verdict::NoMismatch,
         };
@@ -252,7 +268,8 @@ fn parameters<T: Twin>(
 fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> Vec<String> {
     let parts = inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out);
     let mut notes: Vec<String> = parts.flat_map(|p| inquiry.twin.notes(p.recording)).collect();
-    notes.dedup();
+    let mut told = BTreeSet::new();
+    notes.retain(|note| told.insert(note.clone()));
     let smooth = selected.fit.jacobian.ncols();
     if selected.fit.rank < smooth {
         notes.push(format!(

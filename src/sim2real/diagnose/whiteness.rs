@@ -11,7 +11,7 @@ pub(super) struct ChannelMisfit {
     pub channel: String,
     pub sum_of_squares: f64,
     pub count: usize,
-    /// In rows; at least 1 for uncorrelated residuals, less for alternating ones.
+    /// In rows: about 1 for uncorrelated residuals, down to a half for alternating ones.
     pub autocorrelation_time: f64,
 }
 
@@ -61,6 +61,9 @@ pub(super) fn autocorrelation_time(series: &[&[f64]]) -> f64 {
     let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
     let count: usize = series.iter().map(|s| s.len()).sum();
     let Some(covariance) = autocovariances(series, longest).filter(|c| c[0] > 0.0) else { return 1.0 };
+    if covariance.len() < 2 {
+        return 1.0;
+    }
     let mut time = -1.0;
     for pair in covariance.chunks_exact(2) {
         let sum = (pair[0] + pair[1]) / covariance[0];

@@ -2,7 +2,7 @@
 
 use cobyla::{RhoBeg, StopTols, minimize as cobyla_minimize};
 
-use super::least_squares::{Fit, fit_smooth};
+use super::least_squares::{Fit, fit_smooth, prior_penalty};
 use super::problem::{Problem, State};
 use crate::sim2real::Simulator;
 
@@ -66,21 +66,25 @@ pub fn fit<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize]
     let bounds: Vec<(f64, f64)> = stepped.iter().map(|k| (parameters[*k].lower, parameters[*k].upper)).collect();
     let scale: Vec<f64> =
         stepped.iter().zip(&from).map(|(k, v)| if *v == 0.0 { parameters[*k].scale() } else { 0.2 * v.abs() }).collect();
-    let (point, _) = minimize(|point| at(point).objective(), &from, &bounds, &scale, 60);
+    let penalty =
+        |point: &[f64]| stepped.iter().zip(point).map(|(k, value)| prior_penalty(problem, *k, *value)).sum::<f64>();
+    let (point, _) = minimize(|point| at(point).objective() + penalty(point), &from, &bounds, &scale, 60);
     let mut fit = at(&point);
     for (i, k) in stepped.iter().enumerate() {
         let objective = |value: f64| {
             let mut theta = fit.values.clone();
             theta[*k] = value;
-            problem.evaluate(&theta, &fit.state, &[]).residual.norm_squared()
+            problem.evaluate(&theta, &fit.state, &[]).residual.norm_squared() + prior_penalty(problem, *k, value)
         };
         fit.std[*k] = half_width(objective, point[i], bounds[i], scale[i]);
     }
+    fit.prior += penalty(&point);
+    fit.at_bound.extend(stepped.iter().filter(|k| parameters[**k].at_bound(fit.values[**k])));
     fit.free = free.to_vec();
     fit
 }
 
-/// By how far a parameter can be moved before the objective rises by 1, the mean of both directions in which it does:
+/// By how far a parameter can be moved, the others staying, before the objective rises by 1: the mean of both directions in which it does:
 /// the standard deviation, were the objective a parabola.
 fn half_width(objective: impl Fn(f64) -> f64, best: f64, bounds: (f64, f64), scale: f64) -> f64 {
     let limit = objective(best) + 1.0;

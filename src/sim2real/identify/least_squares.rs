@@ -23,7 +23,7 @@ pub struct Fit {
     pub values: Vec<f64>,
     /// Their standard deviations as the noise alone makes them; 0 for fixed ones, infinite for those not determined.
     pub std: Vec<f64>,
-    /// Covariance of the free parameters, in the order of `free`, as noise and priors make it; none where neither data nor
+    /// Covariance of the free parameters that the output depends on smoothly, in their order, as noise and priors make it; none where neither data nor
     /// priors determine them all.
     pub covariance: Option<DMatrix<f64>>,
     /// Numbers of the parameters that were free.
@@ -32,19 +32,21 @@ pub struct Fit {
     pub state: State,
     /// Residuals at the solution, in units of the noise: those of the problem's blocks, then those of priors.
     pub residual: DVector<f64>,
-    /// Derivatives of the residuals by the free parameters.
+    /// Derivatives of the residuals by those of the free parameters that it depends on smoothly.
     pub jacobian: DMatrix<f64>,
     /// Number of directions in the space of the free parameters that the data determine.
     pub rank: usize,
-    /// Names of the parameters that ended at a bound.
-    pub at_bound: Vec<String>,
+    /// What the priors of the free parameters add to the objective.
+    pub prior: f64,
+    /// Numbers of the parameters that ended at a bound.
+    pub at_bound: Vec<usize>,
 }
 
 impl Fit {
     /// Sum of squared residuals, in units of the noise, priors included.
     #[must_use]
     pub fn objective(&self) -> f64 {
-        self.residual.norm_squared()
+        self.residual.norm_squared() + self.prior
     }
 }
 
@@ -141,6 +143,12 @@ fn prior_weight<S: Simulator>(problem: &Problem<'_, S>, k: usize) -> f64 {
     problem.simulator.parameters()[k].prior.filter(|std| *std > 0.0).map_or(0.0, |std| 1.0 / std)
 }
 
+/// What the prior of parameter `k` adds to the objective at `value`.
+pub(super) fn prior_penalty<S: Simulator>(problem: &Problem<'_, S>, k: usize, value: f64) -> f64 {
+    let weight = prior_weight(problem, k);
+    if weight > 0.0 { (weight * (value - problem.simulator.parameters()[k].nominal)).powi(2) } else { 0.0 }
+}
+
 fn with_priors<S: Simulator>(
     problem: &Problem<'_, S>,
     theta: &[f64],
@@ -197,11 +205,8 @@ fn describe<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usi
         let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]);
         std[*k] = if variance >= 0.0 { variance.sqrt() } else { f64::INFINITY };
     }
-    let at_bound = free
-        .iter()
-        .filter(|k| parameters[**k].at_bound(theta[**k]))
-        .map(|k| parameters[*k].name.clone().into_owned())
-        .collect();
+    let at_bound = free.iter().copied().filter(|k| parameters[*k].at_bound(theta[*k])).collect();
+    let prior = free.iter().map(|k| prior_penalty(problem, *k, theta[*k])).sum();
     Fit {
         values: theta,
         std,
@@ -211,6 +216,7 @@ fn describe<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usi
         residual: evaluation.residual,
         jacobian: evaluation.jacobian,
         rank,
+        prior,
         at_bound,
     }
 }

@@ -13,7 +13,7 @@ use crate::sim2real::{ChannelWeight, Parameter, Part, Seed, Simulator, Thetas};
 pub(super) const DIFFERENCE: f64 = 1e-4;
 
 /// What a residual that is not a number is taken for: worse than any other, and finite.
-const DIVERGED: f64 = 1e8;
+const DIVERGED: f64 = 1e15;
 
 /// A simulator beside what it should explain.
 ///
