@@ -3,11 +3,21 @@
 use std::path::PathBuf;
 
 use super::{Axis, Commands, Joint, MECHANISMS};
-use crate::io::{ChannelEntry, InputError, Need, Quantity, TwinFile, hint_among, listed_mechanism, read_trajectory};
+use crate::io::{
+    ChannelEntry, InputError, Need, Quantity, TIME_COLUMN, TrajectoryTable, TwinFile, hint_among, listed_mechanism,
+    read_trajectory,
+};
 use crate::sim2real::{Assembly, Measured, Recording};
 
 /// Rows a recording needs at the least: fewer say nothing about noise, let alone about what is missing.
 const FEWEST_ROWS: usize = 100;
+/// Longest median distance of rows [s]: a servo that is sampled more slowly than this cannot be followed, and a time in
+/// milliseconds looks like it.
+const LONGEST_SPACING: f64 = 0.5;
+/// A distance of rows this many times the median is a gap, over which no motion can be followed.
+const GAP: f64 = 1_000.0;
+/// Positions, velocities and commands are less than this in any unit of theirs.
+const LARGEST: f64 = 1e9;
 
 /// The joint a twin describes, with what it models already.
 ///
@@ -123,6 +133,20 @@ fn recording(twin: &TwinFile, path: &PathBuf, units: [&str; 2]) -> Result<Record
             .found(table.time.len())
             .hint("record for longer: a diagnosis fits on one stretch and proves on another"));
     }
+    check_spacing(&table)?;
+    for (role, column, _) in &columns {
+        let values = table.column(role).unwrap_or_default();
+        if let Some(row) = values.iter().position(|v| v.is_some_and(|v| v.abs() > LARGEST)) {
+            let found = values[row].unwrap_or_default();
+            return Err(table
+                .table
+                .error(column, row, format!("expected a {role} below {LARGEST:e} in size"))
+                .found(found)
+                .hint(
+                    "a value that stands for a lost sample should be an empty cell; otherwise check the unit of the column",
+                ));
+        }
+    }
     let measured = ["position", "velocity"]
         .into_iter()
         .zip(units)
@@ -137,4 +161,28 @@ fn recording(twin: &TwinFile, path: &PathBuf, units: [&str; 2]) -> Result<Record
         measured,
         time: table.time,
     })
+}
+
+/// Refuses times that no motion of a joint can be followed in.
+fn check_spacing(table: &TrajectoryTable) -> Result<(), InputError> {
+    let mut spacings: Vec<f64> = table.time.windows(2).map(|w| w[1] - w[0]).collect();
+    let widest = spacings.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map(|(row, width)| (row, *width));
+    spacings.sort_by(f64::total_cmp);
+    let median = spacings[spacings.len() / 2];
+    if median > LONGEST_SPACING {
+        return Err(InputError::new(table.table.path(), format!("expected rows at most {LONGEST_SPACING} s apart"))
+            .in_column(TIME_COLUMN)
+            .found(median)
+            .hint("`t` is in seconds: divide milliseconds by 1000, and take the recording's start off an epoch"));
+    }
+    match widest {
+        Some((row, width)) if width > (GAP * median).max(LONGEST_SPACING) => {
+            let message = format!("expected no gap, found one of {width} s where rows are {median} s apart");
+            Err(table
+                .table
+                .error(TIME_COLUMN, row + 1, message)
+                .hint("cut the recording there and give its parts one by one"))
+        }
+        _ => Ok(()),
+    }
 }

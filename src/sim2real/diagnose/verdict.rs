@@ -130,7 +130,10 @@ pub(super) fn diagnosis<T: Twin>(
 ) -> Diagnosis {
     let selected = &selection.selected;
     let mut effects = effects(inquiry, selected, places, findings);
-    let verdict = decide(selection, &effects, findings);
+    let verdict = match decide(selection, &effects, findings) {
+        Verdict::Named | Verdict::Ambiguous if !distinct(inquiry, selected, findings) => Verdict::Unexplained,
+        verdict => verdict,
+    };
     if verdict == Verdict::Unexplained {
         effects.iter_mut().for_each(|e| e.confidence *= 1.0 - findings.remainder.clamp(0.0, 1.0));
     }
@@ -160,6 +163,22 @@ pub(super) fn diagnosis<T: Twin>(
     }
 }
 
+/// Whether every mechanism found is told from one that does nothing: by twice its standard deviation, in one of its
+/// parameters at least. A fit may be helped out of a wrong place by a mechanism that then does nothing.
+fn distinct<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> bool {
+    let mut at = inquiry.twin.parameters().len();
+    selected.added.iter().all(|number| {
+        let parameters = &inquiry.candidates[*number].form.parameters;
+        let from = at;
+        at += parameters.len();
+        parameters.iter().enumerate().any(|(k, p)| {
+            let away = (findings.trued.values[from + k] - p.nominal).abs();
+            // Of a parameter that the output jumps on, the width of the plateau is no standard deviation.
+            !p.smooth || away > 2.0 * findings.std[from + k]
+        })
+    })
+}
+
 /// The parameters that ended at a bound, those of mechanisms behind their mechanism's id.
 fn at_bound<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> Vec<String> {
     let own = inquiry.twin.parameters().len();
@@ -173,6 +192,14 @@ fn at_bound<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, finding
 
 fn structured(findings: &Findings) -> bool {
     findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
+}
+
+/// The part of the recalibrated misfit above the noise that is left on held-out data, where what is left stands far above
+/// the noise.
+fn held_out_remainder(fit: &ChannelFit) -> f64 {
+    let above_noise = |rmse: f64| rmse * rmse - fit.noise_floor * fit.noise_floor;
+    let far = fit.trued_rmse * fit.trued_rmse > FAR_ABOVE_THE_NOISE * fit.noise_floor * fit.noise_floor;
+    if far { above_noise(fit.trued_rmse) / above_noise(fit.recalibrated_rmse) } else { 0.0 }
 }
 
 /// Whether the mean square of what is left is at most `times` that of the noise.
@@ -190,11 +217,13 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
             false => Verdict::NoMismatch,
         };
     }
-    // What fits the past and not the future was never excited enough to be told.
+    // What fits the past to the noise and not the future was never excited enough to be told; what fits neither is wrong.
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
-        return Verdict::NotExcited;
+        let clean = within(&selection.selected, FAR_ABOVE_THE_NOISE);
+        return if clean { Verdict::NotExcited } else { Verdict::Unexplained };
     }
-    if left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
+    let unseen = findings.fits.iter().map(held_out_remainder).fold(0.0, f64::max);
+    if unseen > FORM_ERROR || left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
         return Verdict::Unexplained;
     }
     if effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
