@@ -1,6 +1,7 @@
 //! Recordings of a joint that no diagnosis can use: each is refused with its place and a remedy.
 
 #![cfg(feature = "io")]
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 use std::fmt::Write;
 use std::fs;
