@@ -22,7 +22,7 @@ use super::stop::{Outcome, Stop};
 #[command(after_help = "\
 Examples:
   trueup demo
-  trueup demo --out /tmp/trueup-demo --force")]
+  trueup demo --out demo --force")]
 pub(super) struct Demo {
     /// Folder to write the data sets and the reports into
     #[arg(long, value_name = "DIR", default_value = "trueup-demo")]

@@ -4,7 +4,7 @@
 //! twin with mechanisms added, and the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
 //! by their signatures; `select` fits and compares sets of them, by the evidence that `whiteness` counts; `rivals`
 //! looks for other names; `structure` asks what is left; `prove` measures errors on what was held out; `locate`
-//! says where; `verdict` puts it into words.
+//! says where; `verdict` weighs it all, and `words` tells it.
 
 mod diagnosis;
 mod evidence;
@@ -18,6 +18,7 @@ mod select;
 mod structure;
 mod verdict;
 mod whiteness;
+mod words;
 
 pub use diagnosis::{
     ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Score,
