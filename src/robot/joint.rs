@@ -1,5 +1,6 @@
 //! `joint`: one servo joint, or a linear axis.
 
+use super::mover::{Motion, Mover, Push};
 use crate::sim2real::mechanism::HeldLine;
 use crate::sim2real::{
     Channel, Clock, Command, Covariate, DelayLine, Dynamics, Observation, Parameter, Plant, Recording, Stimulus, Thetas,
@@ -47,6 +48,12 @@ const LINEAR_CHANNELS: &[Channel] = &[Channel { name: "position", unit: "m" }, C
 /// Longest step of integration [s]: at 1 ms smooth motions are right to some microradians.
 const LONGEST_STEP: f64 = 1e-3;
 
+/// How contacts of rigid-body engines creep while they hold: friction is `clip(share (inertia rate v + effort), limit)`,
+/// with the impedance and the rate [1/s] of MuJoCo's default `solimp` and `solref` (Todorov, "Convex and analytically
+/// invertible dynamics with contacts and constraints", ICRA 2014; MuJoCo documentation, "Computation").
+pub(super) const CREEP_SHARE: f64 = 0.9;
+pub(super) const CREEP_RATE: f64 = 105.0;
+
 /// A command that holds until the next, in the actuator's own unit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Torque(pub f64);
@@ -77,28 +84,6 @@ impl Stimulus<Joint> for Commands {
     }
 
     fn input(&self, _row: usize, _arriving: &Torque) {}
-}
-
-/// Where a joint is and how fast it moves.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct JointState {
-    /// Position [rad].
-    pub position: f64,
-    /// Velocity [rad/s].
-    pub velocity: f64,
-}
-
-/// What mechanisms add to a joint; the default adds nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct JointEffect {
-    /// Torque [N m].
-    pub torque: f64,
-    /// Spring rate towards position 0 [N m/rad].
-    pub stiffness: f64,
-    /// Damping [N m s/rad].
-    pub damping: f64,
-    /// Largest torque dry friction can hold against [N m].
-    pub dry_friction: f64,
 }
 
 /// What is seen of a joint: position [rad], velocity [rad/s].
@@ -148,8 +133,8 @@ impl Joint {
 impl Plant for Joint {
     type Command = Torque;
     type Input = ();
-    type State = JointState;
-    type Effect = JointEffect;
+    type State = Motion;
+    type Effect = Push;
     type Observation = Posture;
     type Dynamics = JointDynamics;
     type Stimulus = Commands;
@@ -184,7 +169,10 @@ impl Plant for Joint {
             effort: command * gain,
             output: root_mean_square(positions.iter().map(|e| e.position - mean)),
             rate: root_mean_square(positions.iter().map(|e| e.velocity)),
-            ..Typical::default()
+            range: range(positions.iter().map(|e| e.position)),
+            resolution: recordings.iter().map(|r| self.resolution(r, "position")).fold(0.0, f64::max) * 12.0_f64.sqrt(),
+            duration: recordings.iter().filter_map(|r| Some(r.time.last()? - r.time.first()?)).fold(0.0, f64::max),
+            delay: None,
         }
     }
 
@@ -243,6 +231,29 @@ impl Plant for Joint {
     }
 }
 
+impl Mover for Joint {
+    fn motion(state: &Motion) -> Motion {
+        *state
+    }
+
+    fn push(effect: &mut Push) -> &mut Push {
+        effect
+    }
+
+    fn inertia(dynamics: &JointDynamics, lane: usize, _: &Motion) -> f64 {
+        dynamics.inertia[lane]
+    }
+
+    fn drive(dynamics: &JointDynamics, lane: usize, _: &Motion, command: &Torque) -> f64 {
+        dynamics.gain[lane] * command.0
+    }
+
+    fn external(dynamics: &JointDynamics, lane: usize, _: &Motion, position: f64) -> f64 {
+        let gravity = dynamics.gravity_torque[lane];
+        if gravity == 0.0 { 0.0 } else { -gravity * position.sin() }
+    }
+}
+
 /// The running joint: its parameters, lane by lane.
 #[derive(Debug, Clone)]
 pub struct JointDynamics {
@@ -253,21 +264,26 @@ pub struct JointDynamics {
 }
 
 impl Dynamics<Joint> for JointDynamics {
-    fn initial(&self, initial: &Thetas) -> Vec<JointState> {
+    fn initial(&self, initial: &Thetas) -> Vec<Motion> {
         let lanes = initial.row(0).iter().zip(initial.row(1));
-        lanes.map(|(position, velocity)| JointState { position: *position, velocity: *velocity }).collect()
+        lanes.map(|(position, velocity)| Motion { position: *position, velocity: *velocity }).collect()
     }
 
-    fn advance(&self, tick: Tick, states: &mut [JointState], _: &[()], commands: &[Torque], effects: &[JointEffect]) {
+    fn advance(&self, tick: Tick, states: &mut [Motion], _: &[()], commands: &[Torque], effects: &[Push]) {
         let half = 0.5 * tick.step;
         let parameters = self.inertia.iter().zip(&self.viscous_friction).zip(&self.gravity_torque).zip(&self.gain);
         let lanes = states.iter_mut().zip(commands).zip(effects).zip(parameters);
         for (((state, command), effect), (((inertia, viscous), gravity), gain)) in lanes {
+            let inertia = inertia + effect.inertia;
             let midway = state.position + half * state.velocity;
-            let mut torque = gain * command.0 + effect.torque - effect.stiffness * midway;
+            let mut torque = gain * command.0 + effect.effort - effect.stiffness * midway;
             // The sine is most of the work of a step: not where nothing weighs on the joint.
             if *gravity != 0.0 {
                 torque -= gravity * midway.sin();
+            }
+            if effect.creeping_friction > 0.0 {
+                let stopping = CREEP_SHARE * (inertia * CREEP_RATE * state.velocity + torque - viscous * state.velocity);
+                torque -= stopping.clamp(-effect.creeping_friction, effect.creeping_friction);
             }
             let damping = half * (viscous + effect.damping) / inertia;
             let free = (state.velocity * (1.0 - damping) + tick.step * torque / inertia) / (1.0 + damping);
@@ -279,7 +295,7 @@ impl Dynamics<Joint> for JointDynamics {
         }
     }
 
-    fn observe(&self, states: &[JointState], observations: &mut [Posture]) {
+    fn observe(&self, states: &[Motion], observations: &mut [Posture]) {
         for (state, observation) in states.iter().zip(observations) {
             observation.0 = [state.position, state.velocity];
         }
@@ -289,6 +305,13 @@ impl Dynamics<Joint> for JointDynamics {
 fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.filter(|v| v.is_finite()).fold((0.0, 0), |(sum, count), v| (sum + v * v, count + 1));
     (sum / f64::from(count.max(1))).sqrt()
+}
+
+/// Lowest and highest of the values; 0 where there is none.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values
+        .fold(None, |range, v| Some(range.map_or([v, v], |[low, high]: [f64; 2]| [low.min(v), high.max(v)])))
+        .unwrap_or_default()
 }
 
 /// Position and velocity at one row, as measured.

@@ -2,10 +2,12 @@
 
 mod joint;
 pub mod mechanism;
+mod mover;
 #[cfg(feature = "io")]
 mod twin;
 
-pub use joint::{Axis, Commands, Joint, JointDynamics, JointEffect, JointState, Posture, Torque};
+pub use joint::{Axis, Commands, Joint, JointDynamics, Posture, Torque};
 pub use mechanism::MECHANISMS;
+pub use mover::{Motion, Mover, Push};
 #[cfg(feature = "io")]
 pub use twin::{joint_assembly, joint_recordings};

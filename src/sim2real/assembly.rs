@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    Candidate, Channel, Clock, Covariate, Dynamics, Law, Mechanism, Observation, Parameter, Plant, Recording, Seed,
+    Candidate, Channel, Clock, Covariate, Dynamics, Law, Mechanism, Observation, Parameter, Plant, Recording, Scene, Seed,
     Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
 };
 
@@ -116,7 +116,7 @@ impl<P: Plant> Assembly<P> {
             let about = part.mechanism.about();
             let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
             let law = part.mechanism.law(part.form, &thetas.block(at, count), seed.child(about.name));
-            match about.site {
+            match part.mechanism.site(part.form) {
                 Site::Command => run.command_laws.push(law),
                 Site::Plant => run.plant_laws.push(law),
                 Site::Observation => run.observation_laws.push(law),
@@ -181,7 +181,9 @@ impl<P: Plant> Run<P> {
         self.inputs.extend(self.commands.iter().map(input));
         self.effects.fill(P::Effect::default());
         for (k, law) in self.plant_laws.iter_mut().enumerate() {
-            law.act(tick, &self.states, &self.inputs, &self.commands, &mut self.effects);
+            let scene =
+                Scene { dynamics: &self.dynamics, states: &self.states, inputs: &self.inputs, commands: &self.commands };
+            law.act(tick, &scene, &mut self.effects);
             seen(k, &self.effects);
         }
         self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
@@ -260,14 +262,12 @@ impl<P: Plant> Simulator for Assembly<P> {
     }
 }
 
-/// How long before the first row followed the command laws see the commands already [s]: what is on its way then is not
-/// lost, whatever row a run starts from.
-const WARM_UP: f64 = 2.0;
-
 impl<P: Plant> Assembly<P> {
     /// Rows are samples: the observation of a row is taken before its command acts.
     fn follow_samples(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
-        let since = recording.time[rows.start] - WARM_UP;
+        // What is on its way when a run starts is not lost, whatever row it starts from.
+        let memory = self.parts.iter().map(|part| part.mechanism.memory()).fold(0.0, f64::max);
+        let since = recording.time[rows.start] - memory;
         let warm = recording.time[..rows.start].partition_point(|t| *t < since);
         for row in warm..rows.end {
             let time = recording.time[row];
@@ -337,7 +337,8 @@ impl<P: Plant> Twin for Assembly<P> {
                 continue;
             }
             for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {
-                if recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus)) {
+                let known = recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus));
+                if known && mechanism.followed(form_index) {
                     candidates.push(Candidate { about, form, form_index });
                 }
             }

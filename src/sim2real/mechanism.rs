@@ -97,8 +97,35 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn applies(&self, _form: usize, _plant: &P, _stimulus: &P::Stimulus) -> bool {
         true
     }
+    /// Where form `form` acts, where that is not where the mechanism is listed: play in a transmission may be told of the
+    /// command or of the motion.
+    fn site(&self, _form: usize) -> Site {
+        self.about().site
+    }
+    /// Whether following a recording can tell of form `form`. Noise cannot be followed, only recognized.
+    fn followed(&self, _form: usize) -> bool {
+        true
+    }
+    /// For how long what it did before matters to what it does [s]: a run that starts in the middle of a recording sees
+    /// the commands of as long a time before.
+    fn memory(&self) -> f64 {
+        2.0
+    }
     /// The running part of form `form` over the lanes of `thetas`, which holds that form's parameters and no others.
     fn law(&self, form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<P>>;
+}
+
+/// What a law meets inside the plant.
+#[derive(Debug)]
+pub struct Scene<'a, P: Plant> {
+    /// The running plant, which knows the parameters of every lane.
+    pub dynamics: &'a P::Dynamics,
+    /// States, one a lane.
+    pub states: &'a [P::State],
+    /// What the plant meets beside commands, one a lane.
+    pub inputs: &'a [P::Input],
+    /// Commands as they arrive, one a lane.
+    pub commands: &'a [P::Command],
 }
 
 /// The running part of a mechanism over all lanes, and the owner of its memory. It acts through one of its methods.
@@ -106,15 +133,7 @@ pub trait Law<P: Plant>: Send {
     /// Shapes the commands on their way to the plant, one a lane.
     fn shape(&mut self, _tick: Tick, _commands: &mut [P::Command]) {}
     /// Adds to what acts inside the plant, one effect a lane.
-    fn act(
-        &mut self,
-        _tick: Tick,
-        _states: &[P::State],
-        _inputs: &[P::Input],
-        _commands: &[P::Command],
-        _effects: &mut [P::Effect],
-    ) {
-    }
+    fn act(&mut self, _tick: Tick, _scene: &Scene<'_, P>, _effects: &mut [P::Effect]) {}
     /// Distorts the observations on their way back, one a lane.
     fn sense(&mut self, _time: f64, _observations: &mut [P::Observation]) {}
 }

@@ -148,12 +148,27 @@ pub struct Typical {
     pub output: f64,
     /// Of the first channel's rate of change [its unit/s].
     pub rate: f64,
+    /// Lowest and highest value of the first channel, in its unit.
+    pub range: [f64; 2],
+    /// Smallest step the first channel takes, in its unit; 0 where it takes none.
+    pub resolution: f64,
+    /// Duration of the longest recording [s].
+    pub duration: f64,
     /// The delay of commands that the recordings' own time stamps show [s], where they show it.
     pub delay: Option<f64>,
 }
 
 impl Default for Typical {
     fn default() -> Self {
-        Self { command: 1.0, effort: 1.0, output: 1.0, rate: 1.0, delay: None }
+        Self {
+            command: 1.0,
+            effort: 1.0,
+            output: 1.0,
+            rate: 1.0,
+            range: [-1.0, 1.0],
+            resolution: 0.01,
+            duration: 20.0,
+            delay: None,
+        }
     }
 }

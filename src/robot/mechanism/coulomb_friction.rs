@@ -1,7 +1,7 @@
 //! Dry friction: the same against slow motion as against fast, and enough to hold the joint where it is.
 
-use crate::robot::{Joint, JointEffect, JointState, Torque};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-torque sign(v)` in motion; at rest, whatever holds the joint, up to `torque`.
 ///
@@ -10,7 +10,7 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas
 #[derive(Debug, Clone, Copy)]
 pub struct CoulombFriction;
 
-impl Mechanism<Joint> for CoulombFriction {
+impl<P: Mover> Mechanism<P> for CoulombFriction {
     fn about(&self) -> About {
         About {
             name: "coulomb_friction",
@@ -28,23 +28,23 @@ impl Mechanism<Joint> for CoulombFriction {
         Form::only(vec![Parameter::new("torque", "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)])
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Joint>> {
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         Box::new(Friction(thetas.row(0).to_vec()))
     }
 }
 
 struct Friction(Vec<f64>);
 
-impl Law<Joint> for Friction {
-    fn act(&mut self, _: Tick, _: &[JointState], _: &[()], _: &[Torque], effects: &mut [JointEffect]) {
-        effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| effect.dry_friction += torque);
+impl<P: Mover> Law<P> for Friction {
+    fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| P::push(effect).dry_friction += torque);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{Axis, Commands, MECHANISMS};
+    use crate::robot::{Axis, Commands, Joint, MECHANISMS};
     use crate::sim2real::{Assembly, Recording, Seed, Simulator};
 
     /// A push below the friction torque moves nothing, however long it lasts; one above does, and when it ends the joint
@@ -64,7 +64,7 @@ mod tests {
         let recording =
             Recording { name: "push".into(), stimulus: Commands(time.iter().map(push).collect()), measured: vec![], time };
         let arm = Joint::new(Axis::Rotary, [0.11, 0.05, 0.0, 1.0], [0.0; 4]);
-        let form = CoulombFriction.forms(&Typical::default())[0].parameters.clone();
+        let form = Mechanism::<Joint>::forms(&CoulombFriction, &Typical::default())[0].parameters.clone();
         let stuck = Assembly::new(arm, MECHANISMS).with_mechanism(&CoulombFriction, 0, form);
         let thetas = Thetas::single(&[0.11, 0.05, 0.0, 1.0, 0.2, 0.3, 0.0]);
         let position = &stuck.rollout(&thetas, &recording, 0..3_000, Seed(0))[0][0].samples;

@@ -1,7 +1,7 @@
 //! Drag that grows with the square of the speed: air, water, a fan.
 
-use crate::robot::{Joint, JointEffect, JointState, Torque};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-coefficient |v| v`, taken as a damping of `coefficient |v|` so that no step can overshoot it.
 ///
@@ -9,7 +9,7 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas
 #[derive(Debug, Clone, Copy)]
 pub struct QuadraticDrag;
 
-impl Mechanism<Joint> for QuadraticDrag {
+impl<P: Mover> Mechanism<P> for QuadraticDrag {
     fn about(&self) -> About {
         About {
             name: "quadratic_drag",
@@ -27,17 +27,17 @@ impl Mechanism<Joint> for QuadraticDrag {
         Form::only(vec![Parameter::new("coefficient", "N m s^2/rad^2", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)])
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Joint>> {
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         Box::new(Drag(thetas.row(0).to_vec()))
     }
 }
 
 struct Drag(Vec<f64>);
 
-impl Law<Joint> for Drag {
-    fn act(&mut self, _: Tick, states: &[JointState], _: &[()], _: &[Torque], effects: &mut [JointEffect]) {
-        for ((effect, state), coefficient) in effects.iter_mut().zip(states).zip(&self.0) {
-            effect.damping += coefficient * state.velocity.abs();
+impl<P: Mover> Law<P> for Drag {
+    fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        for ((effect, state), coefficient) in effects.iter_mut().zip(scene.states).zip(&self.0) {
+            P::push(effect).damping += coefficient * P::motion(state).velocity.abs();
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A spring towards position 0: a cable, a bellows, a return spring.
 
-use crate::robot::{Joint, JointEffect, JointState, Torque};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-rate q`.
 ///
@@ -9,7 +9,7 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas
 #[derive(Debug, Clone, Copy)]
 pub struct Stiffness;
 
-impl Mechanism<Joint> for Stiffness {
+impl<P: Mover> Mechanism<P> for Stiffness {
     fn about(&self) -> About {
         About {
             name: "stiffness",
@@ -27,15 +27,15 @@ impl Mechanism<Joint> for Stiffness {
         Form::only(vec![Parameter::new("rate", "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)])
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Joint>> {
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         Box::new(Spring(thetas.row(0).to_vec()))
     }
 }
 
 struct Spring(Vec<f64>);
 
-impl Law<Joint> for Spring {
-    fn act(&mut self, _: Tick, _: &[JointState], _: &[()], _: &[Torque], effects: &mut [JointEffect]) {
-        effects.iter_mut().zip(&self.0).for_each(|(effect, rate)| effect.stiffness += rate);
+impl<P: Mover> Law<P> for Spring {
+    fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        effects.iter_mut().zip(&self.0).for_each(|(effect, rate)| P::push(effect).stiffness += rate);
     }
 }
