@@ -210,7 +210,7 @@ fn explained(candidate: &Candidate, points: &[Vec<f64>], signatures: &[DVector<f
     let mut used: Vec<usize> = (0..projected.len()).filter(|i| usable(&projected[*i])).collect();
     loop {
         if used.is_empty() {
-            return None;
+            return opposed(points, projected.into_iter().find(usable)?);
         }
         let columns = DMatrix::from_columns(&used.iter().map(|i| projected[*i].0.clone()).collect::<Vec<_>>());
         let gram = columns.tr_mul(&columns);
@@ -243,6 +243,14 @@ fn explained(candidate: &Candidate, points: &[Vec<f64>], signatures: &[DVector<f
             }
         }
     }
+}
+
+/// A law that would have to act the other way round, at its first start: what refitting hides most of may turn round once
+/// it is fitted jointly.
+fn opposed(points: &[Vec<f64>], (signature, whole): (DVector<f64>, f64)) -> Option<Tried> {
+    let length = signature.norm();
+    let start = points.first()?.clone();
+    Some(Tried { score: 0.0, survival: length / whole, start, signature: signature / length, length })
 }
 
 /// The start moved along its own direction as far as the misfit reaches, where its law has one parameter and that is of

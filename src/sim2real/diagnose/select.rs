@@ -28,6 +28,12 @@ const BEAM: usize = 3;
 const FITTED: usize = 6;
 /// Further forms fitted of each of the two most promising mechanisms.
 const FURTHER_FORMS: usize = 2;
+/// Of a mechanism that survives refitting by less than this part, what screening says is worth little: ...
+const HIDDEN: f64 = 0.15;
+/// ... unless it says it this loudly ...
+const LOUD: f64 = 0.5;
+/// ... so that many such are fitted whatever it says.
+const FITTED_HIDDEN: usize = 2;
 /// Signatures with a cosine above this look alike: such rivals are fitted too.
 const ALIKE: f64 = 0.9;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
@@ -166,10 +172,15 @@ fn chosen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, screened: &
     let (most, further) = if place == 0 { (FITTED, FURTHER_FORMS) } else { (FITTED / 2, 0) };
     let mut mechanisms: Vec<&str> = Vec::new();
     let mut forms: Vec<usize> = Vec::new();
+    let mut hidden = 0;
     screened
         .iter()
         .enumerate()
         .map(|(rank, one)| {
+            if place == 0 && one.excited && one.survival < HIDDEN && one.score < LOUD {
+                hidden += 1;
+                return hidden <= FITTED_HIDDEN;
+            }
             if one.score <= 0.0 || !one.excited || !(rank < ALWAYS_FITTED || hopeful(one.score)) {
                 return false;
             }
