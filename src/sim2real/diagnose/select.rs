@@ -146,6 +146,7 @@ fn expand<T: Twin>(inquiry: &Inquiry<'_, T>, beam: &[Hypothesis<T>], stage: usiz
                 stage,
                 screen: screened.score.max(0.0),
                 survival: screened.survival,
+                excited: screened.excited,
                 gain: child.as_ref().map(|child| gain(inquiry, &beam[0], child)),
                 accepted: false,
             }
