@@ -43,59 +43,70 @@ pub(super) fn next<T: Twin>(
         return None;
     }
     let others = contenders(inquiry, selection, places);
-    let mut names: Vec<String> = effects.iter().map(|e| e.mechanism.clone()).collect();
-    names.extend(others.iter().map(|(name, _)| name.clone()).filter(|n| !n.is_empty()));
-    let designed = Design::of(inquiry, &selection.selected, &others).and_then(|design| design.best());
-    let Some((excitation, gain, rows, so_far)) = designed else { return Some((advice(names, None), None)) };
-    if gain < TELLS {
-        return Some((advice(names, Some(gain)), None));
+    let own: Vec<&str> = effects.iter().map(|e| e.mechanism.as_str()).collect();
+    let all: Vec<&str> = others.iter().map(|(name, _)| name.as_str()).collect();
+    let Some(best) = Design::of(inquiry, &selection.selected, &others).and_then(|design| design.best()) else {
+        let what = format!("record with other amplitudes and frequencies, so that {} no longer look alike", pair(&own, &all));
+        return Some((advice(what, &own, &all), None));
+    };
+    let told = |tells: bool| -> Vec<&str> {
+        all.iter().zip(&best.gains).filter(|(_, gain)| (**gain >= TELLS) == tells).map(|(name, _)| *name).collect()
+    };
+    let (apart, alike) = (told(true), told(false));
+    let least = |gains: &[f64]| -> f64 {
+        gains.iter().zip(&best.gains).filter(|(_, g)| **g >= TELLS).map(|(g, _)| *g).fold(f64::INFINITY, f64::min)
+    };
+    if apart.is_empty() {
+        let what = format!(
+            "no command within one and a half times the range used tells {} apart: measure another channel, or with less noise",
+            pair(&own, &all)
+        );
+        return Some((advice(what, &own, &all), None));
     }
-    let separation = (2.0 * gain / rows as f64).sqrt();
-    let seconds = excitation.time.last().copied().unwrap_or(0.0) + excitation.time.get(1).copied().unwrap_or(0.0);
-    let what = format!(
-        "send {EXPERIMENT_FILE} ({} s of {}) and record as before: {} would then differ by {} noise standard deviations even \
-         after refitting, an expected gain in log-likelihood of {} (the same of the commands at hand: {})",
+    let (gain, so_far) = (least(&best.gains), least(&best.so_far));
+    let separation = (2.0 * gain / best.rows as f64).sqrt();
+    let time = &best.excitation.time;
+    let seconds = time.last().copied().unwrap_or(0.0) + time.get(1).copied().unwrap_or(0.0);
+    let mut what = format!(
+        "send {EXPERIMENT_FILE}, {} s of {}, and record as before: {} would then differ by {} noise standard deviations even \
+         after refitting, which is worth {} in log-likelihood (the commands at hand: {})",
         figure(seconds, 2),
-        excitation.name,
-        told_apart(&names),
+        best.excitation.name,
+        pair(&own, &apart),
         figure(separation, 2),
         figure(gain, 2),
         figure(so_far, 2)
     );
+    if !alike.is_empty() {
+        what += &format!("; {} will look alike whatever is sent", pair(&own, &alike));
+    }
+    let rivals = own.iter().chain(&apart).filter(|n| !n.is_empty()).map(|n| (*n).to_owned()).collect();
     let next = NextExperiment {
         what,
         file: Some(EXPERIMENT_FILE.to_owned()),
-        rivals: names,
+        rivals,
         separation: Some(separation),
         gain: Some(gain),
         gain_so_far: Some(so_far),
     };
-    Some((next, Some(excitation)))
+    Some((next, Some(best.excitation)))
 }
 
-fn told_apart(names: &[String]) -> String {
-    match names {
+/// What is to be told apart: what was found and its rivals, none of which is the twin without what was found.
+fn pair(own: &[&str], others: &[&str]) -> String {
+    let named: Vec<&str> = own.iter().chain(others).copied().filter(|name| !name.is_empty()).collect();
+    match named.as_slice() {
         [] => "the hypotheses left".to_owned(),
-        [one] => format!("the twin with {one} and without it"),
+        all if others.iter().all(|name| name.is_empty()) => format!("the twin with {} and without", all.join(", ")),
+        [one] => (*one).to_owned(),
         [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
     }
 }
 
 /// Words alone: where commands are no numbers, or none within reach tells.
-fn advice(names: Vec<String>, gain: Option<f64>) -> NextExperiment {
-    let what = match gain {
-        None => format!(
-            "record with other amplitudes and frequencies, so that {} no longer look alike",
-            told_apart(&names)
-        ),
-        Some(gain) => format!(
-            "no command within one and a half times the range used tells {} apart (best expected gain in log-likelihood: {}): \
-             measure another channel, or with less noise",
-            told_apart(&names),
-            figure(gain, 2)
-        ),
-    };
-    NextExperiment { what, file: None, rivals: names, separation: None, gain, gain_so_far: None }
+fn advice(what: String, own: &[&str], others: &[&str]) -> NextExperiment {
+    let rivals = own.iter().chain(others).filter(|n| !n.is_empty()).map(|n| (*n).to_owned()).collect();
+    NextExperiment { what, file: None, rivals, separation: None, gain: None, gain_so_far: None }
 }
 
 /// The hypotheses to tell the selected one from, the most probable first: its rivals, fitted; where there are none, the twin
@@ -128,11 +139,22 @@ fn contenders<T: Twin>(
     fitted.collect()
 }
 
+/// The best commands.
+struct Best {
+    excitation: Excitation,
+    /// Expected gain in log-likelihood over each of the others ...
+    gains: Vec<f64>,
+    /// ... and the same of the commands that were recorded.
+    so_far: Vec<f64>,
+    /// Residuals behind the gains.
+    rows: usize,
+}
+
 /// What commands are compared by.
 struct Design<'a, 'b, T: Twin> {
     inquiry: &'a Inquiry<'b, T>,
-    /// Pairs of what may be true and what is then refitted to it.
-    pairs: Vec<(&'a Hypothesis<T>, &'a Hypothesis<T>)>,
+    selected: &'a Hypothesis<T>,
+    others: &'a [(String, Hypothesis<T>)],
     base: &'a Recording<T::Stimulus>,
     family: Vec<Excitation>,
     /// What the first channel may not leave.
@@ -164,31 +186,30 @@ impl<'a, 'b, T: Twin> Design<'a, 'b, T> {
         let (low, high) =
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
         let room = BEYOND * (high - low);
-        let pairs = others.iter().flat_map(|(_, other)| [(selected, other), (other, selected)]).collect();
         let family = family(rows, spacing, used, inquiry.seed);
-        Some(Self { inquiry, pairs, base, family, within: [low - room, high + room] })
+        Some(Self { inquiry, selected, others, base, family, within: [low - room, high + room] })
     }
 
-    /// The best command, the gain expected of it, the number of residuals behind that, and the gain of what was recorded.
-    fn best(&self) -> Option<(Excitation, f64, usize, f64)> {
-        let mut ranked: Vec<(usize, f64)> = self
-            .family
-            .par_iter()
-            .enumerate()
-            .filter_map(|(k, signal)| Some((k, self.gain(&self.recording(signal)?, true, false)?.0)))
-            .collect();
+    /// The commands that tell as many of the others apart as well as can be.
+    fn best(&self) -> Option<Best> {
+        let worth = |gains: &[f64]| gains.iter().map(|gain| gain.ln_1p()).sum::<f64>();
+        let of = |k: usize, refitted: bool| self.gains(&self.recording(&self.family[k])?, true, refitted);
+        let all: Vec<usize> = (0..self.family.len()).collect();
+        let mut ranked: Vec<(usize, f64)> =
+            all.par_iter().filter_map(|k| Some((*k, worth(&of(*k, false)?.0)))).collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         ranked.truncate(REFITTED);
-        let refitted: Vec<(usize, f64, usize)> = ranked
+        let refitted: Vec<(usize, Vec<f64>, usize)> = ranked
             .par_iter()
             .filter_map(|(k, _)| {
-                let (gain, rows) = self.gain(&self.recording(&self.family[*k])?, true, true)?;
-                Some((*k, gain, rows))
+                let (gains, rows) = of(*k, true)?;
+                Some((*k, gains, rows))
             })
             .collect();
-        let (k, gain, rows) = refitted.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let so_far = self.gain(&self.as_recorded()?, false, true).map_or(0.0, |(gain, _)| gain);
-        Some((self.family[k].clone(), gain, rows, so_far))
+        let (k, gains, rows) = refitted.into_iter().max_by(|a, b| worth(&a.1).total_cmp(&worth(&b.1)))?;
+        let so_far = self.as_recorded().and_then(|made| self.gains(&made, false, true));
+        let so_far = so_far.map_or_else(|| vec![0.0; gains.len()], |(gains, _)| gains);
+        Some(Best { excitation: self.family[k].clone(), gains, so_far, rows })
     }
 
     fn recording(&self, signal: &Excitation) -> Option<Recording<T::Stimulus>> {
@@ -201,38 +222,47 @@ impl<'a, 'b, T: Twin> Design<'a, 'b, T> {
         self.inquiry.twin.excited(self.base, self.base.time.clone(), commands)
     }
 
-    /// The smallest gain in log-likelihood over all pairs, `N / 2` times the mean squared separation in units of the noise,
-    /// and the number of residuals: with the parameters of the other moved to first order, or `refitted`. None where a
-    /// simulation diverges, or leaves what is safe though it `must` not.
-    fn gain(&self, recording: &Recording<T::Stimulus>, must: bool, refitted: bool) -> Option<(f64, usize)> {
-        let mut least: Option<(f64, usize)> = None;
-        for (truth, other) in &self.pairs {
-            let measured = self.measured(recording, truth, must)?;
-            let part = [Part::whole(&measured)];
-            let weights = &self.inquiry.evidence.weights;
-            let problem =
-                Problem { simulator: &other.twin, parts: &part, weights, seed: self.inquiry.seed };
-            let parameters = other.twin.parameters();
-            let free: Vec<usize> = other.fit.free.iter().copied().filter(|k| parameters[*k].smooth).collect();
-            let state = State::unknown(&problem);
-            let (left, rows) = if refitted {
-                let fit = fit_smooth(&problem, &other.fit.values, &free, &state);
-                let rows: usize = problem.blocks().iter().map(|b| b.range.len()).sum();
-                (fit.residual.rows(0, rows).norm_squared(), rows)
-            } else {
-                let evaluation = problem.evaluate(&other.fit.values, &state, &free);
-                let q = evaluation.jacobian.clone().qr().q();
-                let hidden = q.tr_mul(&evaluation.residual);
-                (evaluation.residual.norm_squared() - hidden.norm_squared(), evaluation.measured)
-            };
-            // What diverged has residuals beyond any that a system can show.
-            if !left.is_finite() || left > 1e12 * rows as f64 || rows == 0 {
-                return None;
-            }
-            let gain = (0.5 * left.max(0.0), rows);
-            least = Some(least.map_or(gain, |known| if gain.0 < known.0 { gain } else { known }));
+    /// The gain in log-likelihood over each of the others, `N / 2` times the mean squared separation in units of the noise,
+    /// whichever of the two is true, and the number of residuals: with the parameters of the wrong one moved to first order,
+    /// or `refitted`. None where a simulation diverges, or leaves what is safe though it `must` not.
+    fn gains(&self, recording: &Recording<T::Stimulus>, must: bool, refitted: bool) -> Option<(Vec<f64>, usize)> {
+        let mut rows = 0;
+        let mut gains = Vec::new();
+        for (_, other) in self.others {
+            let (forth, count) = self.gain(recording, self.selected, other, must, refitted)?;
+            let (back, _) = self.gain(recording, other, self.selected, must, refitted)?;
+            gains.push(forth.min(back));
+            rows = count;
         }
-        least
+        (!gains.is_empty()).then_some((gains, rows))
+    }
+
+    fn gain(
+        &self,
+        recording: &Recording<T::Stimulus>,
+        truth: &Hypothesis<T>,
+        wrong: &Hypothesis<T>,
+        must: bool,
+        refitted: bool,
+    ) -> Option<(f64, usize)> {
+        let measured = self.measured(recording, truth, must)?;
+        let part = [Part::whole(&measured)];
+        let weights = &self.inquiry.evidence.weights;
+        let problem = Problem { simulator: &wrong.twin, parts: &part, weights, seed: self.inquiry.seed };
+        let parameters = wrong.twin.parameters();
+        let free: Vec<usize> = wrong.fit.free.iter().copied().filter(|k| parameters[*k].smooth).collect();
+        let state = State::unknown(&problem);
+        let (left, rows) = if refitted {
+            let fit = fit_smooth(&problem, &wrong.fit.values, &free, &state);
+            let rows: usize = problem.blocks().iter().map(|b| b.range.len()).sum();
+            (fit.residual.rows(0, rows).norm_squared(), rows)
+        } else {
+            let evaluation = problem.evaluate(&wrong.fit.values, &state, &free);
+            let hidden = evaluation.jacobian.clone().qr().q().tr_mul(&evaluation.residual);
+            (evaluation.residual.norm_squared() - hidden.norm_squared(), evaluation.measured)
+        };
+        // What diverged has residuals beyond any that a system can show.
+        (left.is_finite() && rows > 0 && left < 1e12 * rows as f64).then(|| (0.5 * left.max(0.0), rows))
     }
 
     /// `recording` as it would be measured, without noise, if `truth` were true.
