@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant, Recording, Scene, Seed,
-    Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+    Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant, Recording,
+    Scene, Seed, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
 };
 
 /// The mechanisms a domain knows: one row each.

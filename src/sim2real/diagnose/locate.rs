@@ -75,18 +75,21 @@ pub(super) fn located<T: Twin>(
     for channel in channels {
         let own: Vec<&Track> = tracks.iter().filter(|t| t.channel == channel).collect();
         found.intervals.extend(intervals(&own));
-        let unit = |name: &str| {
-            let known = inquiry.twin.channels().iter().find(|c| c.name == name);
-            known.map(|c| inquiry.twin.unit(c.unit)).unwrap_or_default()
-        };
-        found.against.extend(against(&own, inquiry.twin.clock(), &unit));
+        found.against.extend(against(&own, inquiry.twin.clock(), &|name| unit(inquiry, name)));
     }
     found.intervals.sort_by(|a, b| b.share_of_error.total_cmp(&a.share_of_error));
     found.onset = onset::onset(inquiry, recalibrated).map(|onset| onset.time);
     found
 }
 
-fn tracks<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, covariates: &Covariates) -> Vec<Track> {
+/// The unit of a covariate, where it is a channel's.
+pub(super) fn unit<T: Twin>(inquiry: &Inquiry<'_, T>, name: &str) -> String {
+    let known = inquiry.twin.channels().iter().find(|c| c.name == name);
+    known.map(|c| inquiry.twin.unit(c.unit)).unwrap_or_default()
+}
+
+/// The residuals of `hypothesis`, channel by channel and recording by recording.
+pub(super) fn tracks<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, covariates: &Covariates) -> Vec<Track> {
     let parts = &inquiry.evidence.compared;
     let mut tracks: BTreeMap<(usize, String), Track> = BTreeMap::new();
     for block in inquiry.problem(&hypothesis.twin, parts).blocks() {
@@ -203,8 +206,7 @@ fn against(tracks: &[&Track], clock: Clock, unit: &dyn Fn(&str) -> String) -> Ve
             let signed = range(&first.channel, &name, &unit, &values, &residual);
             let both = values.iter().any(|v| *v < 0.0) && values.iter().any(|v| *v > 0.0);
             let size: Vec<f64> = values.iter().map(|v| v.abs()).collect();
-            let unsigned =
-                if both { range(&first.channel, &format!("|{name}|"), &unit, &size, &residual) } else { None };
+            let unsigned = if both { range(&first.channel, &format!("|{name}|"), &unit, &size, &residual) } else { None };
             // Of a size and its two signs the size is said more simply.
             let unsigned = unsigned.map(|(distance, bin)| (SIMPLER * distance, bin));
             [signed, unsigned].into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0))
@@ -218,8 +220,7 @@ fn against(tracks: &[&Track], clock: Clock, unit: &dyn Fn(&str) -> String) -> Ve
 /// The range of a covariate in which the squared error is densest, and how far the error's distribution over the covariate
 /// is from that of the rows (Kullback & Leibler 1951); none where it is about the same.
 fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) -> Option<(f64, Bin)> {
-    let mut order: Vec<usize> = (0..values.len()).filter(|i| values[*i].is_finite()).collect();
-    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let order = sorted(values);
     let bins = quantile_bins(&order, values);
     if bins.len() < 3 {
         return None;
@@ -227,7 +228,8 @@ fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) 
     let squares = |rows: &[usize]| rows.iter().map(|i| residual[*i] * residual[*i]).sum::<f64>();
     let (total, count) = (squares(&order), order.len() as f64);
     let shares: Vec<(f64, f64)> = bins.iter().map(|b| (squares(b) / total, b.len() as f64 / count)).collect();
-    let distance: f64 = shares.iter().filter(|(error, _)| *error > 0.0).map(|(error, rows)| error * (error / rows).ln()).sum();
+    let distance: f64 =
+        shares.iter().filter(|(error, _)| *error > 0.0).map(|(error, rows)| error * (error / rows).ln()).sum();
     let density = |k: usize| shares[k].0 / shares[k].1;
     let densest = (0..bins.len()).max_by(|a, b| density(*a).total_cmp(&density(*b)))?;
     let low = (0..densest).rev().take_while(|k| density(*k) > WORSE).last().unwrap_or(densest);
@@ -236,9 +238,8 @@ fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) 
     // What holds in one half of the recordings only is a matter of time, not of state.
     let half = |parity: bool| {
         let inside: Vec<usize> = bins[low..=high].iter().flat_map(|b| b.iter().copied()).collect();
-        let own = |rows: &[usize]| -> Vec<usize> {
-            rows.iter().copied().filter(|i| (2 * i >= values.len()) == parity).collect()
-        };
+        let own =
+            |rows: &[usize]| -> Vec<usize> { rows.iter().copied().filter(|i| (2 * i >= values.len()) == parity).collect() };
         let (inside, all) = (own(&inside), own(&order));
         let (of_error, of_rows) = (squares(&inside) / squares(&all), inside.len() as f64 / all.len().max(1) as f64);
         on == "time" || of_error > WORSE * of_rows
@@ -257,6 +258,25 @@ fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) 
         };
         (distance, bin)
     })
+}
+
+/// How unevenly the squared error lies over the values of a covariate (Kullback & Leibler, as [`range`] has it).
+pub(super) fn unevenness(values: &[f64], residual: &[f64]) -> f64 {
+    let order = sorted(values);
+    let squares = |rows: &[usize]| rows.iter().map(|i| residual[*i] * residual[*i]).sum::<f64>();
+    let total = squares(&order);
+    let of = |bin: &&[usize]| {
+        let (error, rows) = (squares(bin) / total, bin.len() as f64 / order.len() as f64);
+        if error > 0.0 { error * (error / rows).ln() } else { 0.0 }
+    };
+    quantile_bins(&order, values).iter().map(of).sum()
+}
+
+/// Numbers of the rows that have a value, by value.
+fn sorted(values: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..values.len()).filter(|i| values[*i].is_finite()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    order
 }
 
 /// Quantile bins of rows sorted by their values; equal values stay together.
@@ -295,13 +315,7 @@ mod tests {
                 noise + more(*t, *v)
             })
             .collect();
-        Track {
-            channel: "position".into(),
-            recording: "r".into(),
-            time,
-            residual,
-            covariates: vec![("velocity", velocity)],
-        }
+        Track { channel: "position".into(), recording: "r".into(), time, residual, covariates: vec![("velocity", velocity)] }
     }
 
     fn of(track: &Track) -> Vec<Bin> {
@@ -330,7 +344,10 @@ mod tests {
     fn finds_the_states_that_are_off() {
         let slow = of(&track(|t, v| if v.abs() < 0.2 { 5.0 * (7.0 * t).cos() } else { 0.0 }));
         assert_eq!(slow[0].on, "|velocity|", "{slow:?}");
-        assert!(slow[0].from.is_none() && (slow[0].to.unwrap() - 0.2).abs() < 0.1 && slow[0].share_of_error > 0.6, "{slow:?}");
+        assert!(
+            slow[0].from.is_none() && (slow[0].to.unwrap() - 0.2).abs() < 0.1 && slow[0].share_of_error > 0.6,
+            "{slow:?}"
+        );
         let forward = of(&track(|_, v| if v > 0.9 { 4.0 } else { 0.0 }));
         assert_eq!(forward[0].on, "velocity", "{forward:?}");
         assert!(forward[0].to.is_none() && (forward[0].from.unwrap() - 0.9).abs() < 0.15, "{forward:?}");

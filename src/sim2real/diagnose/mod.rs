@@ -17,6 +17,7 @@ mod hypothesis;
 mod locate;
 mod noise;
 mod onset;
+mod profile;
 mod prove;
 mod rivals;
 mod screen;
@@ -35,6 +36,7 @@ pub use excitation::Excitation;
 pub use experiment::EXPERIMENT_FILE;
 pub use hypothesis::Hypothesis;
 pub use noise::channel_weights;
+pub use profile::Profile;
 
 use hypothesis::Inquiry;
 use prove::Contest;
@@ -85,6 +87,8 @@ pub struct Outcome<T> {
     pub std: Vec<f64>,
     /// Measurements beside the three twins.
     pub comparisons: Vec<Comparison>,
+    /// Errors over the states they may depend on.
+    pub profiles: Vec<Profile>,
     /// The commands of the next experiment, where one was designed.
     pub excitation: Option<Excitation>,
 }
@@ -147,13 +151,22 @@ pub fn diagnose<T: Twin>(
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
     let activities = activity::activities(&inquiry, &selection.selected, &trued, &covariates);
     activity::tell(&mut diagnosis, &inquiry, &selection.selected, activities);
+    let profiles = profile::profiles(&inquiry, &selection.recalibrated, &selection.selected, &covariates);
     progress("designing the next experiment", 0, 1);
     let next = experiment::next(&inquiry, &selection, &rivals, diagnosis.verdict, &diagnosis.effects);
     let excitation = next.and_then(|(next, excitation)| {
         diagnosis.next_experiment = Some(next);
         excitation
     });
-    Outcome { diagnosis, trued: selection.selected.twin, values: trued.values, std: findings.std, comparisons, excitation }
+    Outcome {
+        diagnosis,
+        trued: selection.selected.twin,
+        values: trued.values,
+        std: findings.std,
+        comparisons,
+        profiles,
+        excitation,
+    }
 }
 
 /// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.
