@@ -109,6 +109,7 @@ pub struct About {
 /// # Contract
 /// - At the nominal values of its parameters it changes no bit of the output.
 /// - At each start it changes something, on a plant that is moved enough.
+/// - No two of its forms have parameters of the same names: a twin tells by them which form it means.
 /// - Its law acts at its site only, and a lane's result never depends on the lanes beside it.
 ///
 /// [`check_mechanism`](super::check_mechanism) runs it.
