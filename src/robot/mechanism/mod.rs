@@ -1,14 +1,28 @@
 //! What simulators of joints tend to leave out: one file each, one row each in [`MECHANISMS`].
 
+mod backlash;
 mod constant_load;
 mod coulomb_friction;
+mod cubic_stiffness;
+mod end_stop;
+mod payload_change;
 mod quadratic_drag;
+mod second_mass;
+mod spring;
 mod stiffness;
+mod stribeck_friction;
+#[cfg(test)]
+mod trial;
 
+pub use backlash::Backlash;
 pub use constant_load::ConstantLoad;
 pub use coulomb_friction::CoulombFriction;
+pub use cubic_stiffness::CubicStiffness;
+pub use end_stop::EndStop;
+pub use payload_change::PayloadChange;
 pub use quadratic_drag::QuadraticDrag;
 pub use stiffness::Stiffness;
+pub use stribeck_friction::StribeckFriction;
 
 use super::Joint;
 use crate::sim2real::Registry;
@@ -20,10 +34,15 @@ pub static MECHANISMS: Registry<Joint> = &[
     &DeadZone,
     &Saturation,
     &ActuatorLag,
+    &Backlash,
     &ConstantLoad,
     &CoulombFriction,
+    &StribeckFriction,
     &QuadraticDrag,
     &Stiffness,
+    &CubicStiffness,
+    &PayloadChange,
+    &EndStop,
     &Bias,
 ];
 
