@@ -10,7 +10,7 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site,
 ///
 /// In the form `gap`, a motor with `motor_share` of the inertia, driven by the command and damped by the joint's viscous
 /// friction, moves the link only where it touches it, at either end of `gap`; in the form `gap_friction` the motor has dry
-/// friction of its own as well. The touch is as stiff as gears are: [`TOUCH`] for motor and link against each other.
+/// friction of its own as well. The touch is stiff: 160 Hz for motor and link against each other, and critically damped.
 ///
 /// Source: Tao & Kokotović, *Adaptive Control of Systems with Actuator and Sensor Nonlinearities* (1996), chapter 2 (play);
 /// Nordin & Gutman, "Controlling mechanical systems with backlash: a survey", Automatica 38 (2002), section 2 (gap).

@@ -1,10 +1,14 @@
 //! What simulators of joints tend to leave out: one file each, one row each in [`MECHANISMS`].
 
 mod backlash;
+mod cogging;
+mod compliance;
 mod constant_load;
 mod coulomb_friction;
 mod cubic_stiffness;
 mod end_stop;
+mod hysteresis;
+mod load_friction;
 mod payload_change;
 mod quadratic_drag;
 mod second_mass;
@@ -15,10 +19,14 @@ mod stribeck_friction;
 mod trial;
 
 pub use backlash::Backlash;
+pub use cogging::Cogging;
+pub use compliance::Compliance;
 pub use constant_load::ConstantLoad;
 pub use coulomb_friction::CoulombFriction;
 pub use cubic_stiffness::CubicStiffness;
 pub use end_stop::EndStop;
+pub use hysteresis::Hysteresis;
+pub use load_friction::LoadFriction;
 pub use payload_change::PayloadChange;
 pub use quadratic_drag::QuadraticDrag;
 pub use stiffness::Stiffness;
@@ -38,11 +46,15 @@ pub static MECHANISMS: Registry<Joint> = &[
     &ConstantLoad,
     &CoulombFriction,
     &StribeckFriction,
+    &LoadFriction,
     &QuadraticDrag,
     &Stiffness,
     &CubicStiffness,
+    &Cogging,
     &PayloadChange,
     &EndStop,
+    &Compliance,
+    &Hysteresis,
     &Bias,
 ];
 
