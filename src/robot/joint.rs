@@ -29,8 +29,16 @@ const PARAMETERS: [(&str, [&str; 2]); 4] = [
 ];
 
 /// The other units that mechanisms of a joint declare, each with what it is on a linear axis.
-const LINEAR: [(&str, &str); 5] =
-    [("N m", "N"), ("N m/rad", "N/m"), ("N m s^2/rad^2", "N s^2/m^2"), ("rad", "m"), ("rad/s", "m/s")];
+const LINEAR: [(&str, &str); 8] = [
+    ("N m", "N"),
+    ("N m/rad", "N/m"),
+    ("N m/rad^3", "N/m^3"),
+    ("N m s^2/rad^2", "N s^2/m^2"),
+    ("rad", "m"),
+    ("rad/s", "m/s"),
+    ("rad/(N m)", "m/N"),
+    ("1/rad", "1/m"),
+];
 
 /// How a joint moves: its units follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -253,6 +261,10 @@ impl Mover for Joint {
     fn external(dynamics: &JointDynamics, lane: usize, _: &Motion, position: f64) -> f64 {
         let gravity = dynamics.gravity_torque[lane];
         if gravity == 0.0 { 0.0 } else { -gravity * position.sin() }
+    }
+
+    fn damping(dynamics: &JointDynamics, lane: usize, _: &Motion) -> f64 {
+        dynamics.viscous_friction[lane]
     }
 }
 

@@ -43,4 +43,8 @@ pub trait Mover: Plant {
     fn drive(dynamics: &Self::Dynamics, lane: usize, state: &Self::State, command: &Self::Command) -> f64;
     /// Effort of everything else the plant knows of but damping, as gravity, were the coordinate at `position` [N m].
     fn external(dynamics: &Self::Dynamics, lane: usize, state: &Self::State, position: f64) -> f64;
+    /// Damping the plant knows of [N m s/rad]; 0 where it has none of its own.
+    fn damping(_dynamics: &Self::Dynamics, _lane: usize, _state: &Self::State) -> f64 {
+        0.0
+    }
 }

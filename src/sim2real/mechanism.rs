@@ -135,7 +135,7 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     /// For how long what it did before matters to what it does [s]: a run that starts in the middle of a recording sees
     /// the commands of as long a time before.
     fn memory(&self) -> f64 {
-        2.0
+        1.0
     }
     /// The running part of form `form` over the lanes of `thetas`, which holds that form's parameters and no others.
     fn law(&self, form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<P>>;

@@ -1,14 +1,36 @@
 //! What simulators of joints tend to leave out: one file each, one row each in [`MECHANISMS`].
 
+mod backlash;
+mod cogging;
+mod compliance;
 mod constant_load;
 mod coulomb_friction;
+mod cubic_stiffness;
+mod end_stop;
+mod hysteresis;
+mod load_friction;
+mod payload_change;
 mod quadratic_drag;
+mod second_mass;
+mod spring;
 mod stiffness;
+mod stribeck_friction;
+#[cfg(test)]
+mod trial;
 
+pub use backlash::Backlash;
+pub use cogging::Cogging;
+pub use compliance::Compliance;
 pub use constant_load::ConstantLoad;
 pub use coulomb_friction::CoulombFriction;
+pub use cubic_stiffness::CubicStiffness;
+pub use end_stop::EndStop;
+pub use hysteresis::Hysteresis;
+pub use load_friction::LoadFriction;
+pub use payload_change::PayloadChange;
 pub use quadratic_drag::QuadraticDrag;
 pub use stiffness::Stiffness;
+pub use stribeck_friction::StribeckFriction;
 
 use super::Joint;
 use crate::sim2real::Registry;
@@ -26,10 +48,19 @@ pub static MECHANISMS: Registry<Joint> = &[
     &RateLimit,
     &ThermalDerating,
     &GainError,
+    &Backlash,
     &ConstantLoad,
     &CoulombFriction,
+    &StribeckFriction,
+    &LoadFriction,
     &QuadraticDrag,
     &Stiffness,
+    &CubicStiffness,
+    &Cogging,
+    &PayloadChange,
+    &EndStop,
+    &Compliance,
+    &Hysteresis,
     &Bias,
     &Drift,
     &Scale,
