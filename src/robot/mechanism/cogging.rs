@@ -15,10 +15,10 @@ pub struct Cogging;
 
 /// Counts a turn at which fits begin: each whole one up to 24, which the motion of a turn or less can tell from its
 /// neighbours; above, those of usual slots and poles.
-const COUNTS: [f64; 43] = [
-    2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0,
-    23.0, 24.0, 26.0, 28.0, 30.0, 32.0, 36.0, 40.0, 42.0, 48.0, 50.0, 54.0, 60.0, 64.0, 72.0, 80.0, 84.0, 96.0, 100.0,
-    120.0, 144.0, 200.0,
+const COUNTS: [f64; 41] = [
+    4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0, 24.0,
+    26.0, 28.0, 30.0, 32.0, 36.0, 40.0, 42.0, 48.0, 50.0, 54.0, 60.0, 64.0, 72.0, 80.0, 84.0, 96.0, 100.0, 120.0, 144.0,
+    200.0,
 ];
 /// Waves on the way an axis goes at which fits begin: up to this many.
 const WAVES: u32 = 40;
@@ -44,7 +44,7 @@ impl<P: Mover> Mechanism<P> for Cogging {
         let waves = TAU / (typical.range[1] - typical.range[0]).max(1e-9);
         let numbers: Vec<f64> = (2..=WAVES).map(|n| f64::from(n) * waves).collect();
         let number = Parameter::new("wave_number", "1/rad", waves).within(0.5 * waves.min(1.0), f64::INFINITY);
-        let counts = Parameter::new("counts", "", 1.0).within(0.5, f64::INFINITY);
+        let counts = Parameter::new("counts", "", 4.0).within(3.0, f64::INFINITY);
         vec![
             Form { name: "per_turn", parameters: vec![amplitude("sine"), amplitude("cosine"), counts.starting_at(&COUNTS)] },
             Form {

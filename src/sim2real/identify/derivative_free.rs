@@ -3,7 +3,7 @@
 use cobyla::{RhoBeg, StopTols, minimize as cobyla_minimize};
 use rayon::prelude::*;
 
-use super::least_squares::{Fit, fit_from, fit_smooth, prior_penalty};
+use super::least_squares::{Effort, Fit, fit_from, fit_smooth, prior_penalty};
 use super::problem::{Problem, State};
 use crate::sim2real::{Clock, Simulator};
 
@@ -53,11 +53,17 @@ pub fn minimize(
 /// Fits the parameters numbered in `free` from the best of `starts`: smooth ones by [`fit_from`], the others by a search
 /// around each start.
 #[must_use]
-pub fn fit<S: Simulator>(problem: &Problem<'_, S>, starts: &[Vec<f64>], free: &[usize], state: &State) -> Fit {
+pub fn fit<S: Simulator>(
+    problem: &Problem<'_, S>,
+    starts: &[Vec<f64>],
+    free: &[usize],
+    state: &State,
+    effort: Effort,
+) -> Fit {
     let parameters = problem.simulator.parameters();
     let (smooth, stepped): (Vec<usize>, Vec<usize>) = free.iter().partition(|k| parameters[**k].smooth);
     if stepped.is_empty() {
-        return fit_from(problem, starts, free, state);
+        return fit_from(problem, starts, free, state, effort);
     }
     let fits: Vec<Fit> = starts.par_iter().map(|start| around(problem, start, &smooth, &stepped, state)).collect();
     let best = fits.into_iter().min_by(|a, b| a.objective().total_cmp(&b.objective()));
