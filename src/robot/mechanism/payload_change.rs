@@ -37,14 +37,14 @@ impl<P: Mover> Mechanism<P> for PayloadChange {
         let fraction =
             |name, least, starts: &[f64]| Parameter::new(name, "", 0.0).within(least, f64::INFINITY).starting_at(starts);
         vec![
-            Form { name: "together", parameters: vec![time(), fraction("fraction", -0.9, &[0.3, -0.3])] },
+            Form { name: "together", parameters: vec![time(), fraction("fraction", -0.9)] },
             Form {
                 name: "apart",
                 parameters: vec![
                     time(),
-                    fraction("inertia_fraction", -0.9, &[0.2]),
+                    fraction("inertia_fraction", -0.9),
                     // A load on the other side of the axis lifts.
-                    fraction("gravity_fraction", -2.0, &[0.4, -0.4]),
+                    fraction("gravity_fraction", -2.0),
                 ],
             },
         ]

@@ -26,7 +26,8 @@ impl<P: Mover> Mechanism<P> for QuadraticDrag {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.05, 0.5].map(|fraction| fraction * typical.effort / (typical.rate * typical.rate).max(1e-12));
-        let drag = |name, unit| Parameter::new(name, unit, 0.0).within(0.0, f64::INFINITY).starting_at(&starts);
+        let drag =
+            |name, unit| Parameter::new(name, unit, 0.0).within(0.0, f64::INFINITY).starting_at(&starts).proportional();
         // A power of 1 is viscous friction, which the plant has.
         let power = Parameter::new("power", "", 2.0).within(1.0, 4.0).starting_at(&[1.5, 3.0]);
         vec![
