@@ -1,4 +1,4 @@
-//! Every mechanism of motion against an integration of its own: classical Runge-Kutta in steps a tenth as long and shorter,
+//! Every mechanism of motion against an integration of its own: classical Runge-Kutta in steps a tenth as long, or a hundredth,
 //! with the law written down anew. The assembly, at 1 ms, is to follow it with the true parameters.
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
@@ -151,7 +151,7 @@ fn gears(x: State) -> f64 {
 }
 
 const CASES: &[Case] = &[
-    Case { mechanism: "coulomb_friction", form: "dry", values: &[0.2], law: |_, x, u| rubbing(x, u, 0.2), most: 2e-4 },
+    Case { mechanism: "coulomb_friction", form: "dry", values: &[0.2], law: |_, x, u| rubbing(x, u, 0.2), most: 1e-4 },
     Case {
         mechanism: "coulomb_friction",
         form: "creeping",
@@ -160,35 +160,35 @@ const CASES: &[Case] = &[
             let net = plain(x, u, 0.0).net;
             plain(x, u, -(0.9 * (INERTIA * 105.0 * x[1] + net)).clamp(-0.2, 0.2))
         },
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "coulomb_friction",
         form: "smooth",
         values: &[0.2, 0.1],
         law: |_, x, u| plain(x, u, -0.2 * (x[1] / 0.1).tanh()),
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "stribeck_friction",
         form: "gaussian",
         values: &[0.15, 0.1, 0.2],
         law: |_, x, u| stribeck(x, u, (-(x[1] / 0.2).powi(2)).exp()),
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "stribeck_friction",
         form: "tustin",
         values: &[0.15, 0.1, 0.2],
         law: |_, x, u| stribeck(x, u, (-(x[1] / 0.2).abs()).exp()),
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "load_friction",
         form: "even",
         values: &[0.05, 0.1],
         law: |_, x, u| rubbing(x, u, 0.05 + 0.1 * (u - gears(x)).abs()),
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "load_friction",
@@ -198,14 +198,14 @@ const CASES: &[Case] = &[
             let load = (u - gears(x)).abs();
             rubbing(x, u, 0.05 + 0.1 * load + (-(x[1] / 0.2).powi(2)).exp() * (0.05 + 0.05 * load))
         },
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "load_friction",
         form: "directional",
         values: &[0.05, 0.1, 0.2],
         law: |_, x, u| rubbing(x, u, 0.05 + (0.1 * u - 0.2 * gears(x)).abs()),
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "quadratic_drag",
@@ -234,7 +234,7 @@ const CASES: &[Case] = &[
         form: "per_turn",
         values: &[0.1, -0.07, 24.0],
         law: |_, x, u| plain(x, u, 0.1 * (24.0 * x[0]).sin() - 0.07 * (24.0 * x[0]).cos()),
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "payload_change",
@@ -246,9 +246,9 @@ const CASES: &[Case] = &[
     Case {
         mechanism: "payload_change",
         form: "apart",
-        values: &[4.0, 0.3, -0.4],
-        law: |t, x, u| loaded(t, x, u, 4.0, 0.3, -0.4),
-        most: 2e-5,
+        values: &[4.0, 0.3, -0.2],
+        law: |t, x, u| loaded(t, x, u, 4.0, 0.3, -0.2),
+        most: 1e-4,
     },
     Case {
         mechanism: "end_stop",
@@ -280,7 +280,7 @@ const CASES: &[Case] = &[
             let damping = 0.1 * (40.0 * reduced).sqrt();
             motor_and_link(x, u, 0.6, 0.0, 40.0 * (x[2] - x[0]) + damping * (x[3] - x[1]))
         },
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "compliance",
@@ -296,7 +296,7 @@ const CASES: &[Case] = &[
                 more: [x[3], (transmitted - GRAVITY * x[2].sin()) / (0.4 * INERTIA)],
             }
         },
-        most: 2e-4,
+        most: 1e-4,
     },
     Case {
         mechanism: "hysteresis",
@@ -317,14 +317,14 @@ const CASES: &[Case] = &[
         form: "gap",
         values: &[0.03, 0.4],
         law: |_, x, u| motor_and_link(x, u, 0.4, 0.0, touch(x, 0.03, 0.4)),
-        most: 2e-3,
+        most: 5e-4,
     },
     Case {
         mechanism: "backlash",
         form: "gap_friction",
         values: &[0.03, 0.4, 0.1],
         law: |_, x, u| motor_and_link(x, u, 0.4, 0.1, touch(x, 0.03, 0.4)),
-        most: 2e-3,
+        most: 5e-4,
     },
 ];
 
@@ -346,7 +346,9 @@ fn every_mechanism_of_motion_follows_an_integration_of_its_own() {
     let mut report = String::new();
     let mut failed = false;
     for case in CASES {
-        let truth = reference(case.law, if case.mechanism == "backlash" { 2e-5 } else { 1e-4 });
+        // Turns and touches end within a step: there the reference is of first order.
+        let abrupt = ["backlash", "coulomb_friction", "load_friction", "stribeck_friction"].contains(&case.mechanism);
+        let truth = reference(case.law, if abrupt { 1e-5 } else { 1e-4 });
         let swing = truth.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
         let with = worst(&assembly(case, true), &truth);
         let without = worst(&assembly(case, false), &truth);
@@ -366,10 +368,11 @@ fn every_mechanism_of_motion_follows_an_integration_of_its_own() {
 /// Play acts on commands, so its reference does too: the arm of the reference under commands that were passed through play.
 #[test]
 fn play_follows_a_recording_of_commands_with_play() {
-    let (width, mut passed) = (0.5, 0.0_f64);
-    let case = Case { mechanism: "backlash", form: "play", values: &[width], law: |_, x, u| plain(x, u, 0.0), most: 0.0 };
+    const WIDTH: f64 = 0.5;
+    let mut passed = 0.0_f64;
+    let case = Case { mechanism: "backlash", form: "play", values: &[WIDTH], law: |_, x, u| plain(x, u, 0.0), most: 0.0 };
     let commands = (0..ROWS).map(|row| {
-        passed = passed.clamp(command(row) - 0.5 * width, command(row) + 0.5 * width);
+        passed = passed.clamp(command(row) - 0.5 * WIDTH, command(row) + 0.5 * WIDTH);
         passed
     });
     let recording = Recording {

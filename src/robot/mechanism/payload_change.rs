@@ -35,7 +35,7 @@ impl<P: Mover> Mechanism<P> for PayloadChange {
         let times: Vec<f64> = (1..count).map(|k| k as f64 * spacing).collect();
         let time = || Parameter::new("time", "s", 0.0).within(0.0, f64::INFINITY).starting_at(&times);
         let fraction =
-            |name, least, starts: &[f64]| Parameter::new(name, "", 0.0).within(least, f64::INFINITY).starting_at(starts);
+            |name, least| Parameter::new(name, "", 0.0).within(least, f64::INFINITY).starting_at(&[0.2]).proportional();
         vec![
             Form { name: "together", parameters: vec![time(), fraction("fraction", -0.9)] },
             Form {
