@@ -278,7 +278,8 @@ impl<P: Plant> Assembly<P> {
     /// Rows are samples: the observation of a row is taken before its command acts.
     fn follow_samples(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
         // What is on its way when a run starts is not lost, whatever row it starts from.
-        let memory = self.parts.iter().map(|part| part.mechanism.memory()).fold(0.0, f64::max);
+        let shaping = self.parts.iter().filter(|part| part.mechanism.site(part.form) == Site::Command);
+        let memory = shaping.map(|part| part.mechanism.memory()).fold(0.0, f64::max);
         let since = recording.time[rows.start] - memory;
         let warm = recording.time[..rows.start].partition_point(|t| *t < since);
         for row in warm..rows.end {

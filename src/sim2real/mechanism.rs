@@ -109,6 +109,7 @@ pub struct About {
 /// # Contract
 /// - At the nominal values of its parameters it changes no bit of the output.
 /// - At each start it changes something, on a plant that is moved enough.
+/// - No two of its forms have parameters of the same names: a twin tells by them which form it means.
 /// - Its law acts at its site only, and a lane's result never depends on the lanes beside it.
 ///
 /// [`check_mechanism`](super::check_mechanism) runs it.
@@ -134,7 +135,7 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     /// For how long what it did before matters to what it does [s]: a run that starts in the middle of a recording sees
     /// the commands of as long a time before.
     fn memory(&self) -> f64 {
-        2.0
+        1.0
     }
     /// The running part of form `form` over the lanes of `thetas`, which holds that form's parameters and no others.
     fn law(&self, form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<P>>;

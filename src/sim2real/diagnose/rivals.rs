@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::hypothesis::Inquiry;
 use super::select::{Selection, gain};
-use crate::sim2real::Twin;
+use crate::sim2real::{About, Twin};
 
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
@@ -58,10 +58,25 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
             let others: Vec<(usize, f64)> = screened
                 .par_iter()
                 .map(|s| (s.number, whole - gain(inquiry, less, &inquiry.extended(less, s.number, s))))
+                .map(|(other, loss)| {
+                    (other, loss - handicap(inquiry.candidates[*own].about, inquiry.candidates[other].about))
+                })
                 .collect();
             Place { gain: whole, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
         })
         .collect()
+}
+
+/// What a law that contains another must be better by to stand in its place: one more constant fits anything a little
+/// better.
+fn handicap(own: About, other: About) -> f64 {
+    if own.contains.contains(&other.name) {
+        WITHIN
+    } else if other.contains.contains(&own.name) {
+        -WITHIN
+    } else {
+        0.0
+    }
 }
 
 /// Probabilities of the selected mechanism and of each rival, from what they lose: the gain is twice the logarithm of a

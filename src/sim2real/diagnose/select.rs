@@ -82,6 +82,11 @@ pub(super) fn select<T: Twin>(
 }
 
 impl<T: Twin> Selection<T> {
+    /// Whether what was selected leaves hardly more than the noise.
+    pub fn complete(&self) -> bool {
+        self.selected.misfits.iter().all(|m| m.sum_of_squares <= ABOVE_NOISE * m.count as f64)
+    }
+
     /// Marks the scores of what was selected, each in the last stage in which it was tried.
     pub fn mark_accepted(&mut self, candidates: &[Candidate]) {
         for number in &self.selected.added {

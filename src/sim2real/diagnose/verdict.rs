@@ -197,8 +197,12 @@ fn structured(findings: &Findings) -> bool {
 /// the noise.
 fn held_out_remainder(fit: &ChannelFit) -> f64 {
     let above_noise = |rmse: f64| rmse * rmse - fit.noise_floor * fit.noise_floor;
-    let far = fit.trued_rmse * fit.trued_rmse > FAR_ABOVE_THE_NOISE * fit.noise_floor * fit.noise_floor;
-    if far { above_noise(fit.trued_rmse) / above_noise(fit.recalibrated_rmse) } else { 0.0 }
+    if far_off(fit) { above_noise(fit.trued_rmse) / above_noise(fit.recalibrated_rmse) } else { 0.0 }
+}
+
+/// Whether what is left on held-out data stands far above the noise.
+fn far_off(fit: &ChannelFit) -> bool {
+    fit.trued_rmse * fit.trued_rmse > FAR_ABOVE_THE_NOISE * fit.noise_floor * fit.noise_floor
 }
 
 /// Whether the mean square of what is left is at most `times` that of the noise.
@@ -213,6 +217,8 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
         return match left_over || !within(&selection.selected, FAR_ABOVE_THE_NOISE) {
             _ if rows == 0 || (rows < FEWEST_ROWS && !within(&selection.selected, AT_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
+            // What is clean where it was fitted and far off elsewhere was not moved enough to be told.
+            false if findings.fits.iter().any(far_off) => Verdict::NotExcited,
             false => Verdict::NoMismatch,
         };
     }

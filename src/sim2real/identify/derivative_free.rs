@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::least_squares::{Fit, fit_from, fit_smooth, prior_penalty};
 use super::problem::{Problem, State};
-use crate::sim2real::Simulator;
+use crate::sim2real::{Clock, Simulator};
 
 /// An improvement smaller than this part of the objective is none: on a plateau the first point found stays.
 const WORTHWHILE: f64 = 1e-6;
@@ -78,7 +78,20 @@ fn around<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], smooth: &[usize
         stepped.iter().zip(&from).map(|(k, v)| if *v == 0.0 { parameters[*k].scale() } else { 0.2 * v.abs() }).collect();
     let penalty =
         |point: &[f64]| stepped.iter().zip(point).map(|(k, value)| prior_penalty(problem, *k, *value)).sum::<f64>();
-    let (point, _) = minimize(|point| at(point).objective() + penalty(point), &from, &bounds, &scale, 60);
+    let point = match problem.simulator.clock() {
+        // Messages are few, and cheap to follow: the smooth parameters are fitted anew at each point.
+        Clock::Event => minimize(|point| at(point).objective() + penalty(point), &from, &bounds, &scale, 60).0,
+        // Signals are not: the smooth parameters stay where they fit best at the start.
+        Clock::Sampled { .. } => {
+            let held = at(&from);
+            let objective = |point: &[f64]| {
+                let mut theta = held.values.clone();
+                stepped.iter().zip(point).for_each(|(k, value)| theta[*k] = *value);
+                problem.evaluate(&theta, &held.state, &[]).residual.norm_squared() + penalty(point)
+            };
+            minimize(objective, &from, &bounds, &scale, 30).0
+        }
+    };
     let mut fit = at(&point);
     for (i, k) in stepped.iter().enumerate() {
         let objective = |value: f64| {
