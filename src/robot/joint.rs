@@ -1,6 +1,6 @@
 //! `joint`: one servo joint, or a linear axis.
 
-use super::mover::{Motion, Mover, Push};
+use super::mover::{Motion, Mover, Push, rubbed};
 use crate::sim2real::mechanism::HeldLine;
 use crate::sim2real::{
     Channel, Clock, Command, Covariate, DelayLine, Dynamics, Observation, Parameter, Plant, Recording, Stimulus, Thetas,
@@ -296,14 +296,19 @@ impl Dynamics<Joint> for JointDynamics {
                 torque -= gravity * midway.sin();
             }
             if effect.creeping_friction > 0.0 {
-                let stopping = CREEP_SHARE * (inertia * CREEP_RATE * state.velocity + torque - viscous * state.velocity);
-                torque -= stopping.clamp(-effect.creeping_friction, effect.creeping_friction);
+                let driven = |velocity: f64| torque - viscous * velocity;
+                let stopping = |velocity: f64| {
+                    let whole = CREEP_SHARE * (inertia * CREEP_RATE * velocity + driven(velocity));
+                    whole.clamp(-effect.creeping_friction, effect.creeping_friction)
+                };
+                // As of the middle of the step: creep is fast for a step.
+                let change = (driven(state.velocity) - stopping(state.velocity)) / inertia;
+                torque -= stopping(state.velocity + half * change);
             }
             let damping = half * (viscous + effect.damping) / inertia;
             let free = (state.velocity * (1.0 - damping) + tick.step * torque / inertia) / (1.0 + damping);
             let held = tick.step * effect.dry_friction / (inertia * (1.0 + damping));
-            // At most as much as stops the joint: within that, it sticks.
-            let velocity = if held > 0.0 { free.signum() * (free.abs() - held).max(0.0) } else { free };
+            let velocity = if held > 0.0 { rubbed(state.velocity, free, held) } else { free };
             state.position = midway + half * velocity;
             state.velocity = velocity;
         }

@@ -37,10 +37,7 @@ impl<P: Mover> Mechanism<P> for Cogging {
     }
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
-        let amplitude = |name| {
-            let starts = [0.1, -0.1].map(|fraction| fraction * typical.effort);
-            Parameter::new(name, "N m", 0.0).starting_at(&starts).proportional()
-        };
+        let amplitude = |name| Parameter::new(name, "N m", 0.0).starting_at(&[0.05 * typical.effort]).proportional();
         let waves = TAU / (typical.range[1] - typical.range[0]).max(1e-9);
         let numbers: Vec<f64> = (2..=WAVES).map(|n| f64::from(n) * waves).collect();
         let number = Parameter::new("wave_number", "1/rad", waves).within(0.5 * waves.min(1.0), f64::INFINITY);

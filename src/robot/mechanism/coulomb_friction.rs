@@ -76,13 +76,26 @@ struct Smooth {
 }
 
 impl<P: Mover> Law<P> for Smooth {
-    fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let parameters = self.torque.iter().zip(&self.velocity);
-        for ((effect, state), (torque, scale)) in effects.iter_mut().zip(scene.states).zip(parameters) {
-            let ratio = P::motion(state).velocity / scale;
-            // As a damping, so that no step can overshoot it; near rest tanh(x) / x is 1.
-            let slope = if ratio.abs() < 1e-4 { 1.0 } else { ratio.tanh() / ratio };
-            P::push(effect).damping += torque / scale * slope;
+        let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();
+        for (lane, ((effect, state), (torque, scale))) in lanes {
+            let velocity = P::motion(state).velocity;
+            let level = (velocity / scale).tanh();
+            let (friction, tangent) = (torque * level, torque / scale * (1.0 - level * level));
+            // Along the tangent the friction is that of the middle of the step, to second order; along the line to the
+            // origin no step can overshoot rest. So the one in fast motion and the other in slow.
+            let within = tick.step * friction.abs();
+            let fast = (velocity.abs() * P::inertia(scene.dynamics, lane, state) - within).clamp(0.0, within);
+            let slope = if fast < within {
+                let chord = if velocity == 0.0 { tangent } else { friction / velocity };
+                chord + (tangent - chord) * fast / within
+            } else {
+                tangent
+            };
+            let push = P::push(effect);
+            push.damping += slope;
+            push.effort -= friction - slope * velocity;
         }
     }
 }

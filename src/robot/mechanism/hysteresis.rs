@@ -28,11 +28,11 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let parameters = |angle| {
-            let torques = [0.05, 0.3].map(|fraction| fraction * typical.effort);
+            let torques = [0.1].map(|fraction| fraction * typical.effort);
             let output = typical.output.max(1e-9);
             let angles = [0.03, 0.2, 0.8].map(|fraction| fraction * output);
             vec![
-                Parameter::new("torque", "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&torques),
+                Parameter::new("torque", "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&torques).proportional(),
                 Parameter::new(angle, "rad", output).within(1e-4 * output.min(1.0), f64::INFINITY).starting_at(&angles),
             ]
         };

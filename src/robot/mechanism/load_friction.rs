@@ -1,5 +1,6 @@
 //! Dry friction of gears, which grows with the load they carry.
 
+use super::stribeck_friction::falling;
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
@@ -115,9 +116,13 @@ impl<P: Mover> Law<P> for StribeckGears {
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         for (lane, (effect, state)) in effects.iter_mut().zip(scene.states).enumerate() {
             let (drive, external) = efforts(tick, scene, lane, state);
-            let fading = (-(P::motion(state).velocity / self.velocity[lane]).powi(2)).exp();
-            P::push(effect).dry_friction +=
-                self.sliding.friction(lane, drive, external) + fading * self.sticking.friction(lane, drive, external);
+            let scale = self.velocity[lane];
+            let ratio = P::motion(state).velocity.abs() / scale;
+            let sticking = (-ratio * ratio).exp() * self.sticking.friction(lane, drive, external);
+            let inertia = P::inertia(scene.dynamics, lane, state);
+            let push = P::push(effect);
+            push.dry_friction += self.sliding.friction(lane, drive, external) + sticking;
+            push.inertia -= falling(2.0 * ratio / scale * sticking, inertia, tick.step);
         }
     }
 }

@@ -34,18 +34,17 @@ impl<P: Mover> Mechanism<P> for PayloadChange {
         let count = ((typical.duration / spacing).ceil() as usize).clamp(2, TIMES as usize);
         let times: Vec<f64> = (1..count).map(|k| k as f64 * spacing).collect();
         let time = || Parameter::new("time", "s", 0.0).within(0.0, f64::INFINITY).starting_at(&times);
-        let fraction = |name, least, starts: &[f64]| {
-            Parameter::new(name, "", 0.0).within(least, f64::INFINITY).starting_at(starts).proportional()
-        };
+        let fraction =
+            |name, least| Parameter::new(name, "", 0.0).within(least, f64::INFINITY).starting_at(&[0.2]).proportional();
         vec![
-            Form { name: "together", parameters: vec![time(), fraction("fraction", -0.9, &[0.3, -0.3])] },
+            Form { name: "together", parameters: vec![time(), fraction("fraction", -0.9)] },
             Form {
                 name: "apart",
                 parameters: vec![
                     time(),
-                    fraction("inertia_fraction", -0.9, &[0.2]),
+                    fraction("inertia_fraction", -0.9),
                     // A load on the other side of the axis lifts.
-                    fraction("gravity_fraction", -2.0, &[0.4, -0.4]),
+                    fraction("gravity_fraction", -2.0),
                 ],
             },
         ]

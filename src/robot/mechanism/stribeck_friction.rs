@@ -63,27 +63,54 @@ struct Friction {
 }
 
 impl Friction {
-    fn add<P: Mover>(&self, scene: &Scene<'_, P>, effects: &mut [P::Effect], fading: impl Fn(f64) -> f64) {
+    /// `fading` gives the part of the excess that is left at a speed in units of its parameter, and minus its derivative.
+    fn add<P: Mover>(
+        &self,
+        tick: Tick,
+        scene: &Scene<'_, P>,
+        effects: &mut [P::Effect],
+        fading: impl Fn(f64) -> (f64, f64),
+    ) {
         let parameters = self.torque.iter().zip(&self.excess).zip(&self.fading);
-        for ((effect, state), ((torque, excess), per_velocity)) in effects.iter_mut().zip(scene.states).zip(parameters) {
-            P::push(effect).dry_friction += torque + excess * fading(P::motion(state).velocity * per_velocity);
+        let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();
+        for (lane, ((effect, state), ((torque, excess), per_velocity))) in lanes {
+            let (left, fall) = fading(P::motion(state).velocity.abs() * per_velocity);
+            let push = P::push(effect);
+            push.dry_friction += torque + excess * left;
+            let inertia = P::inertia(scene.dynamics, lane, state);
+            push.inertia -= falling(excess * per_velocity * fall, inertia, tick.step);
         }
     }
+}
+
+/// Inertia that dry friction seems to take off which falls by `fall` [N m s/rad] with speed.
+///
+/// Dry friction is that of the start of a step; that it falls on the way counts like an inertia that is not there: with it
+/// the friction is that of the middle of the step, to second order. A fall too steep for the step to follow counts for less.
+#[inline]
+pub(super) fn falling(fall: f64, inertia: f64, step: f64) -> f64 {
+    (0.5 * step * fall).min(0.25 * inertia)
 }
 
 struct Gaussian(Friction);
 
 impl<P: Mover> Law<P> for Gaussian {
-    fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        self.0.add(scene, effects, |ratio| (-ratio * ratio).exp());
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.0.add(tick, scene, effects, |ratio| {
+            let left = (-ratio * ratio).exp();
+            (left, 2.0 * ratio * left)
+        });
     }
 }
 
 struct Tustin(Friction);
 
 impl<P: Mover> Law<P> for Tustin {
-    fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        self.0.add(scene, effects, |ratio| (-ratio.abs()).exp());
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.0.add(tick, scene, effects, |ratio| {
+            let left = (-ratio).exp();
+            (left, left)
+        });
     }
 }
 
