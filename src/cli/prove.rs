@@ -198,9 +198,8 @@ fn told_before(header: &Header, seed: u64, done: usize) -> String {
 
 fn told(screen: &Screen, summary: &Summary) -> String {
     let mut table =
-        screen.table(["figure", ">trueup (95 %)", ">of", ">least", ">aim", "", ">recalibrated", ">regression", ">oracle"]);
+        screen.table(["figure", ">trueup (95 %)", ">of", ">least, aim", "", ">recalib.", ">regress.", ">oracle"]);
     for figure in &summary.figures {
-        let [least, aim] = figure.wanted().unwrap_or_default();
         let standing = match figure.standing {
             Standing::Aim => "aim",
             Standing::Least => "least",
@@ -211,8 +210,7 @@ fn told(screen: &Screen, summary: &Summary) -> String {
             figure.name.clone(),
             figure.shown(),
             figure.of.to_string(),
-            least,
-            aim,
+            figure.wanted_short(),
             standing.to_owned(),
             figure.beside(figure.recalibration),
             figure.beside(figure.regression),
@@ -227,5 +225,5 @@ fn told(screen: &Screen, summary: &Summary) -> String {
     if !summary.failures.is_empty() {
         text += &titled("The worst answers", &worst);
     }
-    text + "\n"
+    text + "\nWhat each figure is of stands in figures.md.\n\n"
 }

@@ -7,8 +7,10 @@ use super::wilson::{quantile, wilson};
 /// A figure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
-    /// What it is of.
+    /// What it is of, in a few words.
     pub name: String,
+    /// What it is of, in full.
+    pub meaning: String,
     /// In what it is counted.
     pub unit: Unit,
     /// Its value; none where no case tells, or where most of what it is the median of is infinite.
@@ -110,6 +112,7 @@ impl Figure {
         let none = None;
         Self {
             name: name.to_owned(),
+            meaning: String::new(),
             unit,
             value,
             interval: None,
@@ -120,6 +123,11 @@ impl Figure {
             regression: none,
             oracle: none,
         }
+    }
+
+    /// The same figure with what it means.
+    pub(super) fn meaning(self, meaning: &str) -> Self {
+        Self { meaning: meaning.to_owned(), ..self }
     }
 
     /// The same figure with what was wanted of it.
@@ -156,6 +164,12 @@ impl Figure {
             None => self.unit.shown(goal.aim),
         };
         Some([self.unit.shown(goal.least), aim])
+    }
+
+    /// The least and the aim in a few letters.
+    #[must_use]
+    pub fn wanted_short(&self) -> String {
+        self.wanted().map_or_else(String::new, |[least, aim]| format!("{least}, {aim}"))
     }
 
     /// A baseline's value as text.

@@ -22,8 +22,9 @@ pub fn figures_table(summary: &Summary) -> String {
         };
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {least} | {aim} | {standing} | {} | {} | {} |",
+            "| **{}**: {} | {} | {} | {least} | {aim} | {standing} | {} | {} | {} |",
             figure.name,
+            figure.meaning,
             figure.shown(),
             figure.of,
             figure.beside(figure.recalibration),

@@ -39,9 +39,9 @@ impl Summary {
             "In {} blind cases, an effect that can be seen is named right {} of the time; where nothing is missing, \
              something is named {} of the time, and {} where the noise misleads.",
             self.cases,
-            found("name right first, one"),
+            found("right first"),
             found("false name, white"),
-            found("false name, coloured")
+            found("false name, misled")
         )
     }
 
@@ -72,6 +72,7 @@ fn figure(figure: &Figure) -> ProofFigure {
     };
     ProofFigure {
         name: figure.name.clone(),
+        meaning: figure.meaning.clone(),
         value: figure.shown(),
         of: figure.of,
         wanted: figure.wanted(),

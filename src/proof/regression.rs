@@ -1,8 +1,8 @@
 //! A baseline: equation error and sparse regression, as of Brunton, Proctor & Kutz, "Discovering governing equations from
 //! data by sparse identification of nonlinear dynamical systems", PNAS 113 (2016).
 //!
-//! Positions are smoothed and differentiated, and the balance of torques is regressed on a library of terms, of which those
-//! are kept that the Bayesian information criterion asks for. It sees each row for itself, and so no noise in its terms.
+//! Positions are smoothed and differentiated, and accelerations regressed on command, velocity and gravity, and on those of a
+//! library of terms that the Bayesian information criterion asks for. It takes its terms for free of noise, which they are not.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,13 +23,12 @@ const SHARE: f64 = 0.05;
 /// The names it gives, strongest first.
 pub(super) fn regression(case: &Case) -> Vec<String> {
     let Some(rows) = rows(case) else { return Vec::new() };
-    let target = DVector::from_iterator(rows.len(), rows.iter().map(|row| case.nominal[3] * row.command));
+    let mut left = column(&rows, |row| row.acceleration);
     let mut basis: Vec<DVector<f64>> = Vec::new();
-    let mut known: Vec<DVector<f64>> = vec![column(&rows, |row| row.acceleration), column(&rows, |row| row.velocity)];
+    let mut known: Vec<DVector<f64>> = vec![column(&rows, |row| row.command), column(&rows, |row| row.velocity)];
     if case.nominal[2] != 0.0 {
         known.push(column(&rows, |row| row.position.sin()));
     }
-    let mut left = target;
     known.into_iter().for_each(|direction| explain(&mut basis, &mut left, direction));
     let library = library(&rows, case.linear);
     let count = rows.len() as f64;

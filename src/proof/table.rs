@@ -9,82 +9,137 @@ use crate::conceal::benchmark::{Concealed, Kind, Span};
 
 /// All figures, in the order in which they are shown.
 pub(super) fn figures(entries: &[Entry], reliability: &Reliability) -> Vec<Figure> {
-    let clear = |entry: &Entry| entry.single(CLEAR, f64::INFINITY);
-    let null =
-        |adversarial: bool| move |e: &Entry| matches!(e.label.kind, Kind::Null(null) if null.adversarial() == adversarial);
-    let named = |_: &Entry, answer: &Answer| !answer.names.is_empty();
-    let mut all = vec![
-        share(entries, "name right first, one effect of 1 sigma or more", clear, Entry::right_first, (0.85, 0.95)),
-        share(entries, "right among two, or listed as a rival", clear, Entry::right_or_rival, (0.93, 0.99)),
-        share(entries, "name right first, 0.3 to 1 sigma", |e| e.single(WEAK, CLEAR), Entry::right_first, (0.60, 0.80)),
-        share(entries, "pairs exact, both of 1 sigma or more", Entry::clear_pair, Entry::exact, (0.65, 0.85)),
-        share(entries, "false name, white noise or mis-set alone", null(false), named, (0.05, 0.01)),
-        share(entries, "false name, coloured, rounded or coarse", null(true), named, (0.10, 0.03)),
-        share(entries, "outside the library, said so", |e| e.label.kind == Kind::Outside, Entry::said_so, (0.75, 0.95)),
-    ];
+    let mut all = wanted_shares(entries);
     all.extend(located(entries));
     all.extend(parameters(entries));
     all.extend(proven(entries));
-    let ece = Figure::number("calibration error of confidence (ECE)", reliability.error, reliability.of);
+    let ece = Figure::number("calibration error", reliability.error, reliability.of);
+    let ece =
+        ece.meaning("mean distance of the confidence of a name and how often names of such confidence are right (ECE)");
     all.push(ece.wanting(Goal::new(0.10, 0.03)));
-    let seconds =
-        Figure::quantile("time of a diagnosis, median", Unit::Seconds, 0.5, entries.iter().map(|e| e.trial.seconds));
-    all.push(seconds.wanting(Goal::new(30.0, 2.0)));
+    let seconds = Figure::quantile("time of a diagnosis", Unit::Seconds, 0.5, entries.iter().map(|e| e.trial.seconds));
+    all.push(seconds.meaning("median, with as many under way at once as there are threads").wanting(Goal::new(30.0, 2.0)));
     all.extend(further(entries));
     all
 }
 
-/// A share of the cases `of` some kind, beside what the baselines reach.
-fn share(
-    entries: &[Entry],
-    name: &str,
-    of: impl Fn(&Entry) -> bool,
-    holds: impl Fn(&Entry, &Answer) -> bool,
-    (least, aim): (f64, f64),
-) -> Figure {
-    let figure = plain(entries, name, &of, &holds);
-    let beside = |method: Method| {
-        let own = entries.iter().filter(|entry| of(entry)).map(|entry| holds(entry, &entry.answer(method)));
-        Figure::share("", own).value
+/// Shares that something is wanted of.
+fn wanted_shares(entries: &[Entry]) -> Vec<Figure> {
+    let share = |name: &str, meaning: &str, of: &dyn Fn(&Entry) -> bool, holds: Holds<'_>, least: f64, aim: f64| {
+        let beside = |method: Method| {
+            let own = entries.iter().filter(|entry| of(entry)).map(|entry| holds(entry, &entry.answer(method)));
+            Figure::share("", own).value
+        };
+        let (recalibration, regression) = (beside(Method::Recalibration), beside(Method::Regression));
+        let figure = plain(entries, name, meaning, of, holds).wanting(Goal::new(least, aim));
+        Figure { recalibration, regression, ..figure }
     };
-    let (recalibration, regression) = (beside(Method::Recalibration), beside(Method::Regression));
-    Figure { recalibration, regression, ..figure.wanting(Goal::new(least, aim)) }
+    let null =
+        |adversarial: bool| move |e: &Entry| matches!(e.label.kind, Kind::Null(null) if null.adversarial() == adversarial);
+    let named = |_: &Entry, answer: &Answer| !answer.names.is_empty();
+    vec![
+        share(
+            "right first",
+            "one effect of 1 sigma or more: the name most certain is the right one, and nothing else is said to be missing",
+            &clear,
+            &Entry::right_first,
+            0.85,
+            0.95,
+        ),
+        share(
+            "right among two",
+            "the same effects: the right name is among the first two, or listed as a rival",
+            &clear,
+            &Entry::right_or_rival,
+            0.93,
+            0.99,
+        ),
+        share(
+            "weak, right first",
+            "one effect of 0.3 to 1 sigma",
+            &|e| e.single(WEAK, CLEAR),
+            &Entry::right_first,
+            0.60,
+            0.80,
+        ),
+        share(
+            "pairs exact",
+            "two effects, both of 1 sigma or more: these two and no other",
+            &Entry::clear_pair,
+            &Entry::exact,
+            0.65,
+            0.85,
+        ),
+        share(
+            "false name, white",
+            "something named where nothing is missing: white noise, or parameters that are off alone",
+            &null(false),
+            &named,
+            0.05,
+            0.01,
+        ),
+        share(
+            "false name, misled",
+            "something named where nothing is missing: coloured noise, rounding, a coarse integrator",
+            &null(true),
+            &named,
+            0.10,
+            0.03,
+        ),
+        share(
+            "outside, said so",
+            "an effect that no registry has: unexplained; below 1 sigma it may also go unseen",
+            &|e| e.label.kind == Kind::Outside,
+            &Entry::said_so,
+            0.75,
+            0.95,
+        ),
+    ]
 }
 
-/// A share of which nothing is wanted.
-fn plain(entries: &[Entry], name: &str, of: impl Fn(&Entry) -> bool, holds: impl Fn(&Entry, &Answer) -> bool) -> Figure {
+/// Whether an answer to a case is what is counted.
+type Holds<'a> = &'a dyn Fn(&Entry, &Answer) -> bool;
+
+fn clear(entry: &Entry) -> bool {
+    entry.single(CLEAR, f64::INFINITY)
+}
+
+/// A share of the cases `of` some kind, of which nothing is wanted.
+fn plain(entries: &[Entry], name: &str, meaning: &str, of: &dyn Fn(&Entry) -> bool, holds: Holds<'_>) -> Figure {
     let own = entries.iter().filter(|entry| of(entry));
-    Figure::share(name, own.map(|entry| holds(entry, &entry.answer(Method::Diagnosis))))
+    Figure::share(name, own.map(|entry| holds(entry, &entry.answer(Method::Diagnosis)))).meaning(meaning)
 }
 
 /// Shares that tell more, though nothing is wanted of them.
 fn further(entries: &[Entry]) -> [Figure; 5] {
-    let clear = |entry: &Entry| entry.single(CLEAR, f64::INFINITY);
+    let partly =
+        |entry: &Entry, answer: &Answer| !answer.names.is_empty() && answer.names.iter().all(|name| entry.conceals(name));
+    let silent = |_: &Entry, answer: &Answer| answer.names.is_empty() && !answer.unknown;
+    let null = |entry: &Entry| matches!(entry.label.kind, Kind::Null(_));
     [
-        plain(entries, "one effect of 1 sigma or more: that name and no other", clear, Entry::exact),
-        plain(entries, "pairs exact, all", |e| e.label.kind == Kind::Pair, Entry::exact),
-        plain(entries, "pairs of 1 sigma or more: at least one right, none wrong", Entry::clear_pair, |entry, answer| {
-            !answer.names.is_empty() && answer.names.iter().all(|name| entry.conceals(name))
-        }),
+        plain(entries, "that name alone", "one effect of 1 sigma or more: its name and no other", &clear, &Entry::exact),
+        plain(entries, "all pairs exact", "two effects of any size", &|e| e.label.kind == Kind::Pair, &Entry::exact),
         plain(
             entries,
-            "not excited: nothing named",
-            |e| e.label.kind == Kind::NotExcited,
-            |_, answer| answer.names.is_empty() && !answer.unknown,
+            "pairs, none wrong",
+            "both of 1 sigma or more: at least one right, none wrong",
+            &Entry::clear_pair,
+            &partly,
         ),
         plain(
             entries,
-            "called unexplained where nothing is missing",
-            |e| matches!(e.label.kind, Kind::Null(_)),
-            |_, answer| answer.unknown,
+            "unreached, silent",
+            "an effect that is not reached: nothing named",
+            &|e| e.label.kind == Kind::NotExcited,
+            &silent,
         ),
+        plain(entries, "false alarm", "called unexplained where nothing is missing", &null, &|_, answer| answer.unknown),
     ]
 }
 
 /// Where and when: of single effects that act at times only.
 fn located(entries: &[Entry]) -> [Figure; 2] {
-    let effects: Vec<(&Entry, &Concealed)> =
-        entries.iter().filter(|e| e.single(CLEAR, f64::INFINITY)).map(|e| (e, &e.label.effects[0])).collect();
+    let effects: Vec<(&Entry, &Concealed)> = entries.iter().filter(|e| clear(e)).map(|e| (e, &e.label.effects[0])).collect();
     let overlaps = effects.iter().filter(|(_, effect)| !effect.active.is_empty());
     let overlaps = overlaps.map(|(entry, effect)| overlap(&effect.active, &entry.trial.intervals));
     let times = effects.iter().filter_map(|(entry, effect)| {
@@ -92,9 +147,11 @@ fn located(entries: &[Entry]) -> [Figure; 2] {
         Some(said.map_or(f64::INFINITY, |said| (said - effect.onset.unwrap_or(said)).abs()))
             .filter(|_| effect.onset.is_some())
     });
+    let overlaps = Figure::quantile("intervals, IoU", Unit::Number, 0.5, overlaps);
+    let times = Figure::quantile("event time off by", Unit::Seconds, 0.5, times);
     [
-        Figure::quantile("intervals found, IoU, median", Unit::Number, 0.5, overlaps).wanting(Goal::new(0.6, 0.85)),
-        Figure::quantile("event time off by, median", Unit::Seconds, 0.5, times).wanting(Goal::new(0.3, 0.1)),
+        overlaps.meaning("median overlap of when an effect acted and when it is said to have").wanting(Goal::new(0.6, 0.85)),
+        times.meaning("median; an event that is not dated counts as infinitely far off").wanting(Goal::new(0.3, 0.1)),
     ]
 }
 
@@ -189,16 +246,16 @@ fn proven(entries: &[Entry]) -> [Figure; 2] {
         .filter_map(|entry| Some((&entry.trial, entry.trial.oracle.as_ref()?.held_out)))
         .filter(|(_, oracle)| *oracle > 0.0)
         .collect();
-    let figure = |name: &str, part: f64, least: f64, aim: f64| {
+    let figure = |name: &str, meaning: &str, part: f64, least: f64, aim: f64| {
         let ratios = |of: fn(&Trial) -> f64| told.iter().map(move |(trial, oracle)| of(trial) / oracle);
         let own = Figure::quantile(name, Unit::Number, part, ratios(|trial| trial.held_out.trued));
         let recalibrated = Figure::quantile(name, Unit::Number, part, ratios(|trial| trial.held_out.recalibrated));
         let oracle = (!told.is_empty()).then_some(1.0);
-        Figure { recalibration: recalibrated.value, oracle, ..own.wanting(Goal::new(least, aim)) }
+        Figure { recalibration: recalibrated.value, oracle, ..own.meaning(meaning).wanting(Goal::new(least, aim)) }
     };
     [
-        figure("held-out error over the oracle's, median", 0.5, 1.10, 1.02),
-        figure("held-out error over the oracle's, 95th percentile", 0.95, 1.5, 1.10),
+        figure("error over oracle", "held-out error over that of a fit that was told the names, median", 0.5, 1.10, 1.02),
+        figure("the same, p95", "its 95th percentile", 0.95, 1.5, 1.10),
     ]
 }
 
@@ -240,16 +297,16 @@ mod tests {
         ];
         let figures = figures(&entries, &Reliability::of(&entries));
         let value = |name: &str| figures.iter().find(|f| f.name.starts_with(name)).unwrap().value;
-        assert_eq!(value("name right first, one"), Some(1.0));
-        assert_eq!(value("name right first, 0.3"), Some(0.0));
-        assert_eq!(value("pairs exact, both"), None);
-        assert_eq!((value("false name, white"), value("false name, coloured")), (Some(1.0), Some(0.0)));
+        assert_eq!(value("right first"), Some(1.0));
+        assert_eq!(value("weak, right first"), Some(0.0));
+        assert_eq!(value("pairs exact"), None);
+        assert_eq!((value("false name, white"), value("false name, misled")), (Some(1.0), Some(0.0)));
         assert_eq!(value("outside"), Some(1.0));
-        assert_eq!(value("intervals found"), Some(0.5));
+        assert_eq!(value("intervals, IoU"), Some(0.5));
         assert!((value("event time").unwrap() - 0.2).abs() < 1e-9);
         assert!((value("parameters off by").unwrap() - 0.05).abs() < 1e-9);
-        assert_eq!(value("95 % intervals"), Some(1.0));
-        assert!((value("held-out error over the oracle's, median").unwrap() - 1.25).abs() < 1e-9);
+        assert_eq!(value("intervals hold"), Some(1.0));
+        assert!((value("error over oracle").unwrap() - 1.25).abs() < 1e-9);
         assert_eq!(figures[0].regression, Some(0.0));
     }
 }

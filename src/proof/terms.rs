@@ -1,4 +1,4 @@
-//! The library of sparse regression: what each mechanism would add to the balance of torques, as far as rows show it.
+//! The library of sparse regression: what each mechanism would add to the acceleration, as far as rows show it.
 
 use std::f64::consts::TAU;
 
@@ -86,7 +86,9 @@ fn payload(terms: &mut Terms<'_>) {
     for k in 2..18 {
         let since = end * f64::from(k) / 20.0;
         let there = move |row: &Row| f64::from(u8::from(row.time > since));
-        terms.add("payload_change", &[&|row| there(row) * row.acceleration, &|row| there(row) * row.position.sin()]);
+        // More inertia weakens everything else.
+        let less = |of: fn(&Row) -> f64| move |row: &Row| there(row) * of(row);
+        terms.add("payload_change", &[&less(|r| r.command), &less(|r| r.velocity), &less(|r| r.position.sin())]);
     }
 }
 

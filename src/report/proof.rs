@@ -24,8 +24,10 @@ pub struct ProofPage {
 /// A figure beside what was wanted of it and what the baselines reach, all as text.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProofFigure {
-    /// What it is of.
+    /// What it is of, in a few words.
     pub name: String,
+    /// What it is of, in full.
+    pub meaning: String,
     /// Its value with its interval.
     pub value: String,
     /// Number of cases.

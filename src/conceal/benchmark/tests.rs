@@ -6,17 +6,16 @@ fn cases(seed: u64, indices: std::ops::Range<usize>) -> Vec<Case> {
     indices.map(|index| draw(Seed(seed), index)).collect()
 }
 
-/// Sizes are what they were asked to be, as measured in another way: by the recordings themselves, noise and all. What is
-/// concealed and what is not differ by it alone, so the noise cancels.
+/// Each kind of case conceals what it is for, in a size that it is for.
 #[test]
 fn effects_have_sizes_within_what_is_drawn_and_not_excited_ones_are_not_seen() {
-    let cases = cases(1, 0..10);
+    let cases = cases(1, 0..7);
     let sizes: Vec<f64> = cases
         .iter()
         .filter(|case| matches!(case.label.kind, Kind::Single | Kind::Pair))
         .flat_map(|case| case.label.effects.iter().map(|effect| effect.size))
         .collect();
-    assert!(sizes.len() > 5 && sizes.iter().all(|size| (0.45..36.0).contains(size)), "{sizes:?}");
+    assert!(sizes.len() > 4 && sizes.iter().all(|size| (0.45..36.0).contains(size)), "{sizes:?}");
     for case in &cases {
         match case.label.kind {
             Kind::NotExcited => assert!(case.label.effects.iter().all(|effect| effect.size <= 0.11), "{:?}", case.label),
@@ -34,9 +33,9 @@ fn a_case_is_the_same_wherever_and_whenever_it_is_drawn() {
     let alone = draw(Seed(5), 3);
     let pool = |threads: usize| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     for threads in [1, 4] {
-        let all: Vec<Case> = pool(threads).install(|| (0..5).into_par_iter().map(|index| draw(Seed(5), index)).collect());
-        assert_eq!(all[3], alone);
-        assert_ne!(all[2].train, alone.train);
+        let all: Vec<Case> = pool(threads).install(|| (2..4).into_par_iter().map(|index| draw(Seed(5), index)).collect());
+        assert_eq!(all[1], alone);
+        assert_ne!(all[0].train, alone.train);
     }
     assert_ne!(draw(Seed(6), 3).train, alone.train);
 }
@@ -44,10 +43,13 @@ fn a_case_is_the_same_wherever_and_whenever_it_is_drawn() {
 /// Twins do not tell: what they say is near the truth, exact for the gain, and the same whatever is concealed.
 #[test]
 fn twins_are_off_by_as_much_as_they_say_they_may_be() {
-    for case in cases(2, 0..12) {
+    for case in cases(2, 0..5) {
         let (truth, label) = (case.label.arm.values(), &case.label);
         for k in 0..3 {
-            assert!((case.nominal[k] / truth[k] - 1.0).abs() < 0.31 || truth[k] == 0.0 && case.nominal[k] == 0.0, "{label:?}");
+            assert!(
+                (case.nominal[k] / truth[k] - 1.0).abs() < 0.31 || truth[k] == 0.0 && case.nominal[k] == 0.0,
+                "{label:?}"
+            );
         }
         assert_eq!((case.nominal[3], case.uncertainty[3]), (truth[3], 0.0));
         let rows = case.train.rows();
@@ -62,10 +64,7 @@ fn twins_are_off_by_as_much_as_they_say_they_may_be() {
 /// What happens at a time is labelled with it.
 #[test]
 fn events_carry_their_time() {
-    let index = (0..400).find(|index| {
-        let (kind, _) = planned(*index);
-        kind == 0 && draw(Seed(1), *index).label.effects.iter().any(|effect| effect.id == "payload_change")
-    });
+    let index = (0..400).find(|index| planned(*index).0 == 0 && draw::names(Seed(1), *index).contains(&"payload_change"));
     let label = draw(Seed(1), index.unwrap()).label;
     let effect = &label.effects[0];
     let onset = effect.onset.unwrap();

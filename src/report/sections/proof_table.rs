@@ -28,6 +28,7 @@ impl Section for ProofTable<'_> {
                 let standing = figure.standing.as_ref().map(|(word, tone)| context! { word => word, tone => tone.class() });
                 context! {
                     name => &figure.name,
+                    meaning => &figure.meaning,
                     value => &figure.value,
                     of => figure.of,
                     least => least,
