@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::io::{InputError, TwinFile, hint_among};
 use crate::market::{Execution, execution_twin};
 use crate::robot::{Joint, joint_assembly, joint_recordings};
-use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, calibrate, diagnose};
+use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, Excitation, calibrate, diagnose};
 use crate::sim2real::{Assembly, Plant, Recording, Seed, Simulator};
 
 use super::fitted::FittedTwin;
@@ -35,6 +35,8 @@ pub(super) struct Diagnosed {
     /// The trued twin.
     pub trued: FittedTwin,
     pub comparisons: Vec<Comparison>,
+    /// The commands of the next experiment, where one was designed.
+    pub excitation: Option<Excitation>,
 }
 
 impl Case {
@@ -118,6 +120,7 @@ impl<P: Plant> Given<P> {
             trued: FittedTwin::of(&outcome.trued, &outcome.values, &outcome.std),
             diagnosis: outcome.diagnosis,
             comparisons: outcome.comparisons,
+            excitation: outcome.excitation,
         }
     }
 

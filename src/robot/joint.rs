@@ -92,6 +92,14 @@ impl Stimulus<Joint> for Commands {
     }
 
     fn input(&self, _row: usize, _arriving: &Torque) {}
+
+    fn commands(&self) -> Option<&[f64]> {
+        Some(&self.0)
+    }
+
+    fn commanded(&self, commands: Vec<f64>) -> Option<Self> {
+        Some(Self(commands))
+    }
 }
 
 /// What is seen of a joint: position [rad], velocity [rad/s].

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    Candidate, Channel, Clock, Covariate, Dynamics, Law, Mechanism, Observation, Parameter, Plant, Recording, Scene, Seed,
+    Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant, Recording, Scene, Seed,
     Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
 };
 
@@ -207,6 +207,13 @@ impl<P: Plant> Run<P> {
         &self.observations
     }
 
+    /// Puts all lanes where the first is; what laws remember stays theirs.
+    pub fn rejoin(&mut self) {
+        if let Some((first, others)) = self.states.split_first_mut() {
+            others.iter_mut().for_each(|state| state.clone_from(first));
+        }
+    }
+
     /// The states, one a lane.
     #[must_use]
     pub fn states(&self) -> &[P::State] {
@@ -263,18 +270,60 @@ impl<P: Plant> Simulator for Assembly<P> {
         rows: Range<usize>,
         seed: Seed,
     ) -> Vec<Trajectory> {
+        self.follow(thetas, recording, rows, None, seed)
+    }
+
+    fn rollout_rejoined(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<P::Stimulus>,
+        rows: Range<usize>,
+        every: usize,
+        seed: Seed,
+    ) -> Option<Vec<Trajectory>> {
+        Some(self.follow(thetas, recording, rows, Some(every.max(1)), seed))
+    }
+
+    fn commands(&self, recording: &Recording<P::Stimulus>) -> Option<Vec<f64>> {
+        recording.stimulus.commands().map(<[f64]>::to_vec)
+    }
+
+    fn excited(
+        &self,
+        recording: &Recording<P::Stimulus>,
+        time: Vec<f64>,
+        commands: Vec<f64>,
+    ) -> Option<Recording<P::Stimulus>> {
+        let lost = |m: &Measured| Measured { samples: vec![None; time.len()], ..m.clone() };
+        Some(Recording {
+            name: "next experiment".into(),
+            stimulus: recording.stimulus.commanded(commands)?,
+            measured: recording.measured.iter().map(lost).collect(),
+            time,
+        })
+    }
+}
+
+impl<P: Plant> Assembly<P> {
+    /// Follows `rows`; every `every` rows, if ever, all lanes go on from the state of the first.
+    fn follow(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<P::Stimulus>,
+        rows: Range<usize>,
+        every: Option<usize>,
+        seed: Seed,
+    ) -> Vec<Trajectory> {
         let own = self.parameters.len();
         let mut run = self.run(&thetas.block(0, own), &thetas.block(own, thetas.parameters() - own), seed);
-        let mut out = Follow::new(self.channels(), thetas.lanes(), rows.len());
+        let mut out = Follow::new(self.channels(), thetas.lanes(), rows.len(), every);
         match self.plant.clock() {
             Clock::Event => self.follow_events(&mut run, recording, rows, &mut out),
             Clock::Sampled { .. } => self.follow_samples(&mut run, recording, rows, &mut out),
         }
         out.trajectories
     }
-}
 
-impl<P: Plant> Assembly<P> {
     /// Rows are samples: the observation of a row is taken before its command acts.
     fn follow_samples(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
         // What is on its way when a run starts is not lost, whatever row it starts from.
@@ -285,7 +334,7 @@ impl<P: Plant> Assembly<P> {
         for row in warm..rows.end {
             let time = recording.time[row];
             if row >= rows.start {
-                out.record(run.observe(time));
+                out.record(run, time);
             }
             if row + 1 == rows.end {
                 break;
@@ -310,7 +359,7 @@ impl<P: Plant> Assembly<P> {
             let tick = Tick { index: row, time: recording.time[row], step: 0.0 };
             run.send(tick, &recording.stimulus.command(row));
             run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
-            out.record(run.observe(tick.time));
+            out.record(run, tick.time);
         }
     }
 }
@@ -318,24 +367,31 @@ impl<P: Plant> Assembly<P> {
 /// Collects observations, lane by lane and channel by channel.
 struct Follow {
     trajectories: Vec<Trajectory>,
+    /// Rows after which all lanes go on from the state of the first, if ever.
+    every: Option<usize>,
+    rows: usize,
 }
 
 impl Follow {
-    fn new(channels: &[Channel], lanes: usize, rows: usize) -> Self {
+    fn new(channels: &[Channel], lanes: usize, rows: usize, every: Option<usize>) -> Self {
         let one: Trajectory =
             channels.iter().map(|c| Simulated { channel: c.name.to_owned(), samples: Vec::with_capacity(rows) }).collect();
         // A clone of an empty vector has no capacity: reserve in each lane.
         let mut trajectories = vec![one; lanes];
         trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
-        Self { trajectories }
+        Self { trajectories, every, rows: 0 }
     }
 
-    fn record<O: Observation>(&mut self, observations: &[O]) {
-        for (trajectory, observation) in self.trajectories.iter_mut().zip(observations) {
+    fn record<P: Plant>(&mut self, run: &mut Run<P>, time: f64) {
+        for (trajectory, observation) in self.trajectories.iter_mut().zip(run.observe(time)) {
             for (k, simulated) in trajectory.iter_mut().enumerate() {
                 simulated.samples.push(observation.channel(k));
             }
         }
+        if self.every.is_some_and(|every| self.rows.is_multiple_of(every)) {
+            run.rejoin();
+        }
+        self.rows += 1;
     }
 }
 

@@ -53,6 +53,17 @@ pub trait Stimulus<P: Plant>: Send + Sync {
     fn command(&self, row: usize) -> P::Command;
     /// What the plant meets in row `row`, given the command as it arrives.
     fn input(&self, row: usize, arriving: &P::Command) -> P::Input;
+    /// The commands, one a row, where a command is one number; none elsewhere.
+    fn commands(&self) -> Option<&[f64]> {
+        None
+    }
+    /// The same stimulus with other commands, where a command is one number: what an experiment would send.
+    fn commanded(&self, _commands: Vec<f64>) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
 }
 
 /// A channel a plant can be observed through.

@@ -43,6 +43,32 @@ pub trait Simulator: Send + Sync {
         rows: Range<usize>,
         seed: Seed,
     ) -> Vec<Trajectory>;
+    /// As [`rollout`](Self::rollout), but every `every` rows all lanes go on from the state of the first: what parts them
+    /// then, they did since. None where states cannot be handed over.
+    fn rollout_rejoined(
+        &self,
+        _thetas: &Thetas,
+        _recording: &Recording<Self::Stimulus>,
+        _rows: Range<usize>,
+        _every: usize,
+        _seed: Seed,
+    ) -> Option<Vec<Trajectory>> {
+        None
+    }
+    /// The commands of a recording, one a row, where a command is one number; none elsewhere.
+    fn commands(&self, _recording: &Recording<Self::Stimulus>) -> Option<Vec<f64>> {
+        None
+    }
+    /// A recording yet to be made, of a system driven as that of `recording` is but by `commands`, each from its `time` [s]
+    /// on; nothing is measured in it. None where a command is not one number.
+    fn excited(
+        &self,
+        _recording: &Recording<Self::Stimulus>,
+        _time: Vec<f64>,
+        _commands: Vec<f64>,
+    ) -> Option<Recording<Self::Stimulus>> {
+        None
+    }
 }
 
 /// A mechanism a twin could be given: what diagnosis needs to know of it.

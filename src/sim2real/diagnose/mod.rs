@@ -3,15 +3,20 @@
 //! One file a step, in this order: `evidence` divides the recordings and finds their `noise`; a `hypothesis` is the
 //! twin with mechanisms added, and the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
 //! by their signatures; `select` fits and compares sets of them, by the evidence that `whiteness` counts; `rivals`
-//! looks for other names; `structure` asks what is left; `prove` measures errors on what was held out; `locate`
-//! says where; `verdict` weighs it all, and `words` tells it.
+//! looks for other names; `structure` asks what is left; `prove` measures errors on what was held out; `verdict` weighs it
+//! all, and `words` tells it. `locate` and `onset` say where and since when the twin is off, `activity` when what was named
+//! acted, and `experiment` designs, from the commands of `excitation`, what to record where rivals are left.
 
+mod activity;
 mod diagnosis;
 mod evidence;
+mod excitation;
+mod experiment;
 mod gates;
 mod hypothesis;
 mod locate;
 mod noise;
+mod onset;
 mod prove;
 mod rivals;
 mod screen;
@@ -22,10 +27,12 @@ mod whiteness;
 mod words;
 
 pub use diagnosis::{
-    ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Score,
-    Verdict, Where,
+    Bin, ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment, ParameterChange, Rival, SCHEMA,
+    Score, Stretch, Verdict, Where,
 };
 pub use evidence::{Evidence, HELD_OUT};
+pub use excitation::Excitation;
+pub use experiment::EXPERIMENT_FILE;
 pub use hypothesis::Hypothesis;
 pub use noise::channel_weights;
 
@@ -78,6 +85,8 @@ pub struct Outcome<T> {
     pub std: Vec<f64>,
     /// Measurements beside the three twins.
     pub comparisons: Vec<Comparison>,
+    /// The commands of the next experiment, where one was designed.
+    pub excitation: Option<Excitation>,
 }
 
 /// A twin refitted, with nothing added.
@@ -135,12 +144,22 @@ pub fn diagnose<T: Twin>(
         remainder: verdict::remainder(&inquiry, &selection),
         dependence: verdict::dependence(&inquiry, &selection.selected),
         foretold: verdict::foretold(&inquiry, &selection.selected),
-        intervals: locate::intervals(&comparisons),
         std: inflated(&inquiry, &selection.selected, &trued),
         trued: trued.clone(),
     };
-    let diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
-    Outcome { diagnosis, trued: selection.selected.twin, values: trued.values, std: findings.std, comparisons }
+    let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
+    progress("saying where", 0, 1);
+    let covariates = locate::covariates(&inquiry);
+    diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
+    let activities = activity::activities(&inquiry, &selection.selected, &trued, &covariates);
+    activity::tell(&mut diagnosis, &inquiry, &selection.selected, activities);
+    progress("designing the next experiment", 0, 1);
+    let next = experiment::next(&inquiry, &selection, &rivals, diagnosis.verdict, &diagnosis.effects);
+    let excitation = next.and_then(|(next, excitation)| {
+        diagnosis.next_experiment = Some(next);
+        excitation
+    });
+    Outcome { diagnosis, trued: selection.selected.twin, values: trued.values, std: findings.std, comparisons, excitation }
 }
 
 /// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.

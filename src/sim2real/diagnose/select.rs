@@ -170,6 +170,7 @@ fn expand<T: Twin>(
                 stage,
                 screen: screened.score.max(0.0),
                 survival: screened.survival,
+                excited: screened.excited,
                 gain: child.as_ref().map(|child| gain(inquiry, &beam[0], child)),
                 accepted: false,
             }

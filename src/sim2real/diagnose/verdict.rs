@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::diagnosis::{
-    ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, ParameterChange, Rival, SCHEMA, Verdict, Where,
+    ChannelFit, Checks, Diagnosis, Effect, Estimate, ParameterChange, Rival, SCHEMA, Score, Verdict, Where,
 };
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::{Place, confidences};
@@ -38,7 +38,6 @@ pub(super) struct Findings {
     pub remainder: f64,
     pub dependence: Option<Dependence>,
     pub foretold: f64,
-    pub intervals: Vec<Interval>,
     pub std: Vec<f64>,
     pub trued: Fit,
 }
@@ -143,7 +142,7 @@ pub(super) fn diagnosis<T: Twin>(
         schema: SCHEMA.to_owned(),
         verdict,
         summary: words::summary(inquiry, verdict, &effects, findings),
-        location: Where { intervals: findings.intervals.clone(), onset: None },
+        location: Where::default(),
         parameters: parameters(inquiry, selected, findings),
         fit: findings.fits.clone(),
         checks: Checks {
@@ -152,9 +151,10 @@ pub(super) fn diagnosis<T: Twin>(
             placebo_p: findings.placebo_p,
             at_bound: at_bound(inquiry, selected, findings),
             tried: names.len(),
+            not_excited: not_excited(&selection.scores),
             notes: notes(inquiry, selected, findings),
         },
-        next_experiment: words::next_experiment(verdict, &effects),
+        next_experiment: None,
         scores: selection.scores.clone(),
         modelled: inquiry.twin.modelled().into_iter().map(str::to_owned).collect(),
         held_out: inquiry.evidence.how.clone(),
@@ -187,6 +187,16 @@ fn at_bound<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, finding
     });
     let names = selected.twin.parameters()[..own].iter().map(|p| p.name.clone().into_owned()).chain(added);
     names.enumerate().filter(|(k, _)| findings.trued.at_bound.contains(k)).map(|(_, name)| name).collect()
+}
+
+/// Ids of the mechanisms of which no form would show beside the twin alone.
+fn not_excited(scores: &[Score]) -> Vec<String> {
+    let first: Vec<&Score> = scores.iter().filter(|s| s.stage == 0).collect();
+    let silent = |s: &&&Score| !first.iter().any(|other| other.mechanism == s.mechanism && other.excited);
+    let mut ids: Vec<String> = first.iter().filter(silent).map(|s| s.mechanism.clone()).collect();
+    ids.sort();
+    ids.dedup();
+    ids
 }
 
 fn structured(findings: &Findings) -> bool {
@@ -272,6 +282,8 @@ fn effects<T: Twin>(
             parameters,
             rivals,
             location: None,
+            active: Vec::new(),
+            moved: Vec::new(),
         });
     }
     effects.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
