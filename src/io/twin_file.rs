@@ -24,6 +24,8 @@ pub struct TwinFile {
     document: Document,
     /// `model` of `[twin]`: the plant's name.
     pub model: String,
+    /// `step` of `[twin]`: the longest step of integration [s], where one is given.
+    pub step: Option<f64>,
     /// `[parameters]`: nominal values.
     pub parameters: BTreeMap<String, Quantity>,
     /// `[channels]`: which columns of a recording are which.
@@ -123,6 +125,7 @@ struct TwinTable {
 #[serde(deny_unknown_fields)]
 struct TwinSection {
     model: String,
+    step: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -158,6 +161,10 @@ impl TwinFile {
         for (name, quantity) in &table.parameters {
             quantity.check(&document, &["parameters", name])?;
         }
+        if let Some(step) = table.twin.step.filter(|step| !step.is_finite() || *step <= 0.0) {
+            let error = document.error(&["twin", "step"], "expected a step of integration above 0").found(step);
+            return Err(error.hint("it is the longest step in seconds; left out, it follows from the distance of rows"));
+        }
         check_mechanisms(&document, &table.mechanism)?;
         check_instruments(&document, &table.instrument)?;
         if let Some(assumptions) = &table.assumptions {
@@ -167,6 +174,7 @@ impl TwinFile {
         Ok(Self {
             document,
             model: table.twin.model,
+            step: table.twin.step,
             parameters: table.parameters,
             channels: table.channels,
             mechanisms: table.mechanism,
@@ -203,7 +211,7 @@ impl TwinFile {
     #[must_use]
     pub fn render(&self, folder: &Path) -> String {
         let mut out = String::new();
-        section(&mut out, "[twin]", [("model", Some(text(&self.model)))]);
+        section(&mut out, "[twin]", [("model", Some(text(&self.model))), ("step", self.step.map(float))]);
         let parameters = self.parameters.iter().map(|(name, q)| (name.as_str(), Some(table_form(q))));
         section(&mut out, "[parameters]", parameters);
         let channels = self.channels.iter().map(|(name, channel)| {

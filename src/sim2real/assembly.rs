@@ -310,7 +310,7 @@ struct Follow {
 impl Follow {
     fn new(channels: &[Channel], lanes: usize, rows: usize) -> Self {
         let one: Trajectory =
-            channels.iter().map(|c| Simulated { channel: c.name.to_owned(), samples: Vec::with_capacity(rows) }).collect();
+            channels.iter().map(|c| Simulated { channel: c.name.to_string(), samples: Vec::with_capacity(rows) }).collect();
         // A clone of an empty vector has no capacity: reserve in each lane.
         let mut trajectories = vec![one; lanes];
         trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
@@ -338,7 +338,7 @@ impl<P: Plant> Twin for Assembly<P> {
             }
             for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {
                 let known = recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus));
-                if known && mechanism.followed(form_index) {
+                if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
                     candidates.push(Candidate { about, form, form_index });
                 }
             }
