@@ -2,9 +2,11 @@
 
 mod cart_pole;
 mod estimate;
+mod expression;
 mod joint;
 pub mod mechanism;
 mod mover;
+mod program;
 mod runge_kutta;
 mod signal;
 mod tanks;
