@@ -51,6 +51,7 @@ pub mod conceal;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod market;
+pub mod proof;
 pub mod report;
 pub mod robot;
 pub mod sim2real;

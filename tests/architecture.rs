@@ -14,7 +14,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("market", &["sim2real", "io", "report", "rl"]),
     ("robot", &["sim2real", "io", "report", "rl"]),
     ("strategies", &["sim2real", "market"]),
-    ("cli", &["sim2real", "conceal", "io", "report", "rl", "market", "robot", "strategies"]),
+    ("proof", &["sim2real", "conceal", "report", "robot"]),
+    ("cli", &["sim2real", "conceal", "proof", "io", "report", "rl", "market", "robot", "strategies"]),
 ];
 
 /// What makes a result depend on more than its input, and the rooms that may have it all the same.

@@ -5,6 +5,7 @@
 //! too good.
 
 pub mod bars;
+pub mod benchmark;
 mod catalogue;
 pub mod exchange;
 pub mod servo;

@@ -4,8 +4,11 @@
 
 use std::fmt;
 
-/// A function of one number, by the name it has in expressions.
-pub(super) const FUNCTIONS: [(&str, fn(f64) -> f64); 17] = [
+/// A name that expressions have for something.
+type Named<T> = (&'static str, T);
+
+/// A function of one number.
+pub(super) const FUNCTIONS: [Named<fn(f64) -> f64>; 17] = [
     ("sin", f64::sin),
     ("cos", f64::cos),
     ("tan", f64::tan),
@@ -26,11 +29,11 @@ pub(super) const FUNCTIONS: [(&str, fn(f64) -> f64); 17] = [
 ];
 
 /// A function of two numbers.
-pub(super) const FUNCTIONS_OF_TWO: [(&str, fn(f64, f64) -> f64); 4] =
+pub(super) const FUNCTIONS_OF_TWO: [Named<fn(f64, f64) -> f64>; 4] =
     [("min", f64::min), ("max", f64::max), ("atan2", f64::atan2), ("hypot", f64::hypot)];
 
 /// Names that stand for a number.
-pub(super) const CONSTANTS: [(&str, f64); 1] = [("pi", std::f64::consts::PI)];
+pub(super) const CONSTANTS: [Named<f64>; 1] = [("pi", std::f64::consts::PI)];
 
 /// `sign(0) = 0`, as in mathematics.
 fn sign(x: f64) -> f64 {

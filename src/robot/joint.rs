@@ -47,7 +47,9 @@ impl Axis {
     pub fn unit(self, declared: &str) -> String {
         let declared = match declared {
             "output" => "rad",
+            "output/s" => "rad/s",
             "command" => return "unit of the command".to_owned(),
+            "command/s" => return "units of the command/s".to_owned(),
             other => other,
         };
         let linear = LINEAR.iter().find(|(rotary, _)| self == Self::Linear && *rotary == declared);

@@ -156,7 +156,9 @@ impl Plant for Tanks {
     fn unit(&self, declared: &str) -> String {
         match declared {
             "output" => self.channels[0].unit.to_string(),
+            "output/s" => format!("{}/s", self.channels[0].unit),
             "command" => "unit of the command".to_owned(),
+            "command/s" => "units of the command/s".to_owned(),
             other => other.to_owned(),
         }
     }
@@ -245,8 +247,11 @@ mod tests {
     #[test]
     fn the_plant_and_every_row_of_its_registry_keep_their_contracts() {
         check_plant(&tanks(), TANKS_MECHANISMS, &filling(400)).unwrap();
+        // Some mechanisms act on commands below 0 alone.
+        let mut recording = filling(400);
+        recording.stimulus.0.iter_mut().skip(300).for_each(|u| *u = -*u);
         for mechanism in TANKS_MECHANISMS {
-            check_mechanism(*mechanism, &tanks(), TANKS_MECHANISMS, &filling(400)).unwrap();
+            check_mechanism(*mechanism, &tanks(), TANKS_MECHANISMS, &recording).unwrap();
         }
     }
 

@@ -32,6 +32,8 @@ pub struct Assembly<P: Plant> {
     parts: Vec<Part<P>>,
     parameters: Vec<Parameter>,
     excluded: Vec<String>,
+    /// Longest step of integration [s], where it is not the plant's own.
+    step: Option<f64>,
 }
 
 impl<P: Plant> fmt::Debug for Assembly<P> {
@@ -44,7 +46,14 @@ impl<P: Plant> Assembly<P> {
     /// A plant with no mechanisms yet, which may be given those of `registry`.
     #[must_use]
     pub fn new(plant: P, registry: Registry<P>) -> Self {
-        Self { parameters: plant.parameters(), plant: Arc::new(plant), registry, parts: Vec::new(), excluded: Vec::new() }
+        Self {
+            parameters: plant.parameters(),
+            plant: Arc::new(plant),
+            registry,
+            parts: Vec::new(),
+            excluded: Vec::new(),
+            step: None,
+        }
     }
 
     /// The plant.
@@ -221,7 +230,11 @@ impl<P: Plant> Simulator for Assembly<P> {
     }
 
     fn clock(&self) -> Clock {
-        self.plant.clock()
+        match (self.plant.clock(), self.step) {
+            // A plant of no longest step is not integrated: it goes from row to row.
+            (Clock::Sampled { longest_step: own }, Some(longest_step)) if own.is_finite() => Clock::Sampled { longest_step },
+            (clock, _) => clock,
+        }
     }
 
     fn initial_parameters(&self, recording: &Recording<P::Stimulus>, row: usize) -> Vec<Parameter> {
@@ -279,7 +292,7 @@ impl<P: Plant> Assembly<P> {
             }
             let command = recording.stimulus.command(row);
             let interval = recording.time[row + 1] - time;
-            let substeps = self.plant.clock().substeps(interval);
+            let substeps = self.clock().substeps(interval);
             let step = interval / substeps as f64;
             for sub in 0..substeps {
                 let tick = Tick { index: row, time: time + sub as f64 * step, step };
@@ -355,6 +368,10 @@ impl<P: Plant> Twin for Assembly<P> {
             // A candidate of another registry has nothing to act on here.
             None => self.clone(),
         }
+    }
+
+    fn stepping(&self, seconds: f64) -> Self {
+        Self { step: Some(seconds), ..self.clone() }
     }
 
     fn modelled(&self) -> Vec<&'static str> {

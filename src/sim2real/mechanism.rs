@@ -7,7 +7,21 @@ mod actuator_lag;
 mod bias;
 mod command_delay;
 mod dead_zone;
+mod decay;
+mod drift;
+mod dropout;
+mod eccentricity;
+mod gain_error;
+mod noise;
+mod observation_delay;
+mod quantization;
+mod rate_limit;
+mod rectification;
 mod saturation;
+mod scale;
+mod thermal_derating;
+#[cfg(test)]
+mod wire;
 
 use std::fmt;
 
@@ -19,7 +33,18 @@ pub use actuator_lag::ActuatorLag;
 pub use bias::Bias;
 pub use command_delay::{CommandDelay, HeldLine};
 pub use dead_zone::DeadZone;
+pub use drift::Drift;
+pub use dropout::Dropout;
+pub use eccentricity::Eccentricity;
+pub use gain_error::GainError;
+pub use noise::Noise;
+pub use observation_delay::ObservationDelay;
+pub use quantization::Quantization;
+pub use rate_limit::RateLimit;
+pub use rectification::Rectification;
 pub use saturation::Saturation;
+pub use scale::Scale;
+pub use thermal_derating::ThermalDerating;
 
 /// Where a mechanism acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

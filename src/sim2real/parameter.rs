@@ -23,6 +23,9 @@ pub struct Parameter {
     pub starts: Vec<f64>,
     /// Whether the output is differentiable in it, to within the step of a finite difference.
     pub smooth: bool,
+    /// Whether its effect grows in proportion to it, from the nominal value on, where it is small: a screen then solves
+    /// for it instead of trying values.
+    pub linear: bool,
     /// Where the bounds come from.
     pub source: Cow<'static, str>,
 }
@@ -40,6 +43,7 @@ impl Parameter {
             prior: None,
             starts: Vec::new(),
             smooth: true,
+            linear: false,
             source: Cow::Borrowed(""),
         }
     }
@@ -70,6 +74,13 @@ impl Parameter {
     #[must_use]
     pub fn stepped(mut self) -> Self {
         self.smooth = false;
+        self
+    }
+
+    /// Says that its effect grows in proportion to it, where it is small.
+    #[must_use]
+    pub fn proportional(mut self) -> Self {
+        self.linear = true;
         self
     }
 

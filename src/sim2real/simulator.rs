@@ -63,6 +63,11 @@ pub trait Twin: Simulator + Clone {
     /// The twin with one more mechanism, whose parameters follow those it has.
     #[must_use]
     fn with(&self, candidate: &Candidate) -> Self;
+    /// The twin integrated in steps of at most `seconds` [s]; a twin that has no such choice stays as it is.
+    #[must_use]
+    fn stepping(&self, _seconds: f64) -> Self {
+        self.clone()
+    }
     /// Ids of the mechanisms it models.
     fn modelled(&self) -> Vec<&'static str>;
 }

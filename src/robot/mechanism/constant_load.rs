@@ -24,7 +24,7 @@ impl<P: Mover> Mechanism<P> for ConstantLoad {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.05, -0.05].map(|fraction| fraction * typical.effort);
-        Form::only(vec![Parameter::new("torque", "N m", 0.0).starting_at(&starts)])
+        Form::only(vec![Parameter::new("torque", "N m", 0.0).starting_at(&starts).proportional()])
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

@@ -24,7 +24,12 @@ impl<P: Mover> Mechanism<P> for QuadraticDrag {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.05, 0.5].map(|fraction| fraction * typical.effort / (typical.rate * typical.rate).max(1e-12));
-        Form::only(vec![Parameter::new("coefficient", "N m s^2/rad^2", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)])
+        Form::only(vec![
+            Parameter::new("coefficient", "N m s^2/rad^2", 0.0)
+                .within(0.0, f64::INFINITY)
+                .starting_at(&starts)
+                .proportional(),
+        ])
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

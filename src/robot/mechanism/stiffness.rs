@@ -24,7 +24,9 @@ impl<P: Mover> Mechanism<P> for Stiffness {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.05, 0.3].map(|fraction| fraction * typical.effort / typical.output.max(1e-12));
-        Form::only(vec![Parameter::new("rate", "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)])
+        Form::only(vec![
+            Parameter::new("rate", "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts).proportional(),
+        ])
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

@@ -8,6 +8,7 @@
 
 mod diagnosis;
 mod evidence;
+mod gates;
 mod hypothesis;
 mod locate;
 mod noise;
@@ -30,6 +31,8 @@ pub use noise::channel_weights;
 
 use hypothesis::Inquiry;
 use prove::Contest;
+use rivals::Place;
+use select::Selection;
 
 use super::identify::Fit;
 use super::{Clock, Recording, Seed, Twin};
@@ -108,9 +111,7 @@ pub fn diagnose<T: Twin>(
     let evidence = Evidence::divide(twin, recordings, held_out);
     let candidates = twin.candidates(recordings);
     let inquiry = Inquiry { twin, candidates: &candidates, evidence: &evidence, seed };
-    let selection = select::select(&inquiry, progress);
-    progress("looking for rivals", 0, 1);
-    let (mut selection, rivals) = rivals::settled(&inquiry, selection);
+    let (mut selection, rivals) = selected(&inquiry, progress);
     selection.mark_accepted(&candidates);
     progress("proving on held-out data", 0, 1);
     let recalibrated = inquiry.in_free_run(&selection.recalibrated);
@@ -134,6 +135,30 @@ pub fn diagnose<T: Twin>(
     };
     let diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
     Outcome { diagnosis, trued: selection.selected.twin, values: trued.values, std: findings.std, comparisons }
+}
+
+/// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.
+fn selected<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> (Selection<T>, Vec<Place>) {
+    progress("refitting the twin's own parameters", 0, 1);
+    let given: Vec<f64> = inquiry.twin.parameters().iter().map(|p| p.nominal).collect();
+    if let Some(step) = gates::exploring_step(inquiry.twin, &given, inquiry.evidence) {
+        let twin = inquiry.twin.stepping(step);
+        let coarse = Inquiry { twin: &twin, ..*inquiry };
+        let selection = select::select(&coarse, coarse.recalibrated(), progress);
+        progress("looking for rivals", 0, 1);
+        let (selection, rivals) = rivals::settled(&coarse, selection);
+        let best = &selection.selected;
+        if gates::moved(&best.twin, &best.fit.values, inquiry.evidence, step, gates::own_step(inquiry.twin)) < gates::SETTLED
+        {
+            progress("fitting with the twin's own step", 0, 1);
+            let refitted = selection.refitted(inquiry);
+            let same = refitted.selected.added == selection.selected.added;
+            return if same { (refitted, rivals) } else { rivals::settled(inquiry, refitted) };
+        }
+    }
+    let selection = select::select(inquiry, inquiry.recalibrated(), progress);
+    progress("looking for rivals", 0, 1);
+    rivals::settled(inquiry, selection)
 }
 
 /// Refits the parameters that `twin` has, and adds nothing.

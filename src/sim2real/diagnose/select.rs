@@ -24,8 +24,18 @@ const STAGES: usize = 4;
 const ABOVE_NOISE: f64 = 1.5;
 /// Hypotheses that each stage hands to the next: the best alone may be the wrong one to build on.
 const BEAM: usize = 3;
-/// Candidates fitted from each hypothesis of the beam.
+/// Mechanisms fitted from the best hypothesis of the beam; from the others half as many.
 const FITTED: usize = 6;
+/// Further forms fitted of each of the two most promising mechanisms.
+const FURTHER_FORMS: usize = 2;
+/// Of a mechanism that survives refitting by less than this part, what screening says is worth little: ...
+const HIDDEN: f64 = 0.15;
+/// ... unless it says it this loudly ...
+const LOUD: f64 = 0.5;
+/// ... so that many such are fitted whatever it says.
+const FITTED_HIDDEN: usize = 2;
+/// Signatures with a cosine above this look alike: such rivals are fitted too.
+const ALIKE: f64 = 0.9;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
 const ALWAYS_FITTED: usize = 3;
 /// Others are fitted if their signature, with this many times the evidence the parent's residuals hold, could gain
@@ -45,8 +55,11 @@ pub(super) struct Selection<T> {
 }
 
 /// Selects stage by stage, then leaves out again what the whole does not need.
-pub(super) fn select<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> Selection<T> {
-    let recalibrated = inquiry.recalibrated();
+pub(super) fn select<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    recalibrated: Hypothesis<T>,
+    progress: Progress<'_>,
+) -> Selection<T> {
     let mut scores = Vec::new();
     let mut beam = vec![recalibrated.clone()];
     let mut best_of_stage: Vec<Hypothesis<T>> = Vec::new();
@@ -80,6 +93,14 @@ impl<T: Twin> Selection<T> {
         }
     }
 
+    /// The same selection fitted with another inquiry's step of integration, and what is no longer needed left out.
+    pub fn refitted(&self, inquiry: &Inquiry<'_, T>) -> Self {
+        let recalibrated = inquiry.refitted(&self.recalibrated);
+        let whole = if self.selected.added.is_empty() { Vec::new() } else { vec![inquiry.refitted(&self.selected)] };
+        let (selected, without) = pruned(inquiry, &recalibrated, whole);
+        Self { recalibrated, selected, without, scores: self.scores.clone() }
+    }
+
     /// The selection with the `place`-th mechanism replaced by candidate `other`, and what is no longer needed left out.
     pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
         let less = &self.without[place];
@@ -97,14 +118,12 @@ fn expand<T: Twin>(inquiry: &Inquiry<'_, T>, beam: &[Hypothesis<T>], stage: usiz
     for (place, parent) in beam.iter().enumerate() {
         let mut screened = inquiry.screened(parent);
         screened.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let effective: f64 = parent.misfits.iter().map(ChannelMisfit::effective).sum();
-        let hopeful = |score: f64| -BENEFIT_OF_DOUBT * effective * (1.0 - score * score).ln() > ACCEPT;
-        for (rank, one) in screened.into_iter().enumerate() {
+        let chosen = chosen(inquiry, parent, &screened, place);
+        for (one, chosen) in screened.into_iter().zip(chosen) {
             let mut set: Vec<usize> = parent.set();
             set.push(one.number);
             set.sort_unstable();
-            let fitted =
-                rank < FITTED && one.score > 0.0 && (rank < ALWAYS_FITTED || hopeful(one.score)) && !sets.contains(&set);
+            let fitted = chosen && !sets.contains(&set);
             if fitted {
                 sets.push(set);
             }
@@ -139,6 +158,50 @@ fn expand<T: Twin>(inquiry: &Inquiry<'_, T>, beam: &[Hypothesis<T>], stage: usiz
         children.drain(..).map(|child| (gain(inquiry, reference, &child), child)).collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     (ranked.into_iter().map(|(_, child)| child).collect(), scores)
+}
+
+/// Which of the screened candidates, best first, are fitted: the best mechanisms in their best forms, further forms of the
+/// very best, and whatever looks much like the best.
+fn chosen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, screened: &[Screened], place: usize) -> Vec<bool> {
+    let effective: f64 = parent.misfits.iter().map(ChannelMisfit::effective).sum();
+    // Residuals that are white hold all the evidence there is; others may hold more once more is explained.
+    let whole: f64 = parent.misfits.iter().map(|m| m.count as f64).sum();
+    let doubt = (BENEFIT_OF_DOUBT * effective).min(whole.max(effective));
+    let hopeful = |score: f64| -doubt * (1.0 - score * score).max(1e-300).ln() > ACCEPT;
+    let name = |s: &Screened| inquiry.candidates[s.number].about.name;
+    let (most, further) = if place == 0 { (FITTED, FURTHER_FORMS) } else { (FITTED / 2, 0) };
+    let mut mechanisms: Vec<&str> = Vec::new();
+    let mut forms: Vec<usize> = Vec::new();
+    let mut hidden = 0;
+    screened
+        .iter()
+        .enumerate()
+        .map(|(rank, one)| {
+            if place == 0 && one.excited && one.survival < HIDDEN && one.score < LOUD {
+                hidden += 1;
+                return hidden <= FITTED_HIDDEN;
+            }
+            if one.score <= 0.0 || !one.excited || !(rank < ALWAYS_FITTED || hopeful(one.score)) {
+                return false;
+            }
+            match mechanisms.iter().position(|m| *m == name(one)) {
+                // Another form of a mechanism that is fitted already.
+                Some(known) => {
+                    forms[known] += 1;
+                    known < 2 && forms[known] <= further
+                }
+                None => {
+                    let alike = one.signature.dot(&screened[0].signature).abs() > ALIKE;
+                    let fitted = mechanisms.len() < most || alike && mechanisms.len() < 2 * most;
+                    if fitted {
+                        mechanisms.push(name(one));
+                        forms.push(0);
+                    }
+                    fitted
+                }
+            }
+        })
+        .collect()
 }
 
 /// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time.

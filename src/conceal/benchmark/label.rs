@@ -1,0 +1,60 @@
+//! What a case is told of after its diagnosis, and not before.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::arm::Arm;
+use super::kind::Kind;
+
+/// The truth about a case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Label {
+    /// Number of the case.
+    pub index: usize,
+    /// What it is for.
+    pub kind: Kind,
+    /// What is concealed, by registries' names; empty where there is nothing, or nothing that a registry has.
+    pub effects: Vec<Concealed>,
+    /// What is concealed that no registry has, and its size [noise standard deviations].
+    pub outside: Option<(String, f64)>,
+    /// Names that are neither right nor wrong: a sensor whose noise is rounded does count in steps.
+    pub tolerated: Vec<String>,
+    /// The arm as it really is.
+    pub arm: Arm,
+    /// The arm as the twin has it.
+    pub nominal: [f64; 4],
+    /// Standard deviation of the noise [rad].
+    pub noise: f64,
+    /// Noise in words.
+    pub noise_kind: String,
+    /// Signal over noise [dB].
+    pub snr: f64,
+    /// How the arm was moved, in words: to learn from, and to test on.
+    pub excitation: [String; 2],
+}
+
+/// One concealed effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Concealed {
+    /// The name a right diagnosis says.
+    pub id: String,
+    /// Root mean square, over the rows to learn from, of what it changes and refitting could not hide [noise standard
+    /// deviations].
+    pub size: f64,
+    /// Its true parameters, as far as a registry's of that name can be compared with them.
+    pub parameters: BTreeMap<String, f64>,
+    /// When it began [s], where not from the start.
+    pub onset: Option<f64>,
+    /// When it acted, in the recording to learn from, where it acts at times only.
+    pub active: Vec<Span>,
+}
+
+/// A stretch of time [s].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Span {
+    /// Its start.
+    pub start: f64,
+    /// Its end.
+    pub end: f64,
+}

@@ -1,0 +1,236 @@
+//! The motion of an arm, by fourth-order Runge-Kutta between the instants at which commands reach its driver.
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::arm::Arm;
+use super::driver::{self, Driver};
+use super::effect::Effect;
+use super::load::{self, Instant, Load};
+use crate::sim2real::Seed;
+
+/// Commands of a recording, and where the arm is when it begins.
+#[derive(Debug, Clone)]
+pub(super) struct Drive {
+    /// One a row.
+    pub commands: Vec<f64>,
+    /// Time between rows [s].
+    pub sample: f64,
+    /// Position at rest before the first row.
+    pub start: f64,
+    /// Velocity at the first row: 0 but where sensitivities are asked for.
+    pub speed: f64,
+}
+
+impl Drive {
+    /// Time of a row [s], rounded to the nanosecond so that files show 0.012 and not 0.012000000000000002.
+    pub fn time(&self, row: usize) -> f64 {
+        (row as f64 * self.sample * 1e9).round() / 1e9
+    }
+}
+
+/// How finely to integrate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Precision {
+    /// Steps of 0.1 ms at most: what is recorded.
+    Fine,
+    /// Steps of 1 ms at most, finer where anything is stiff: while a strength is looked for.
+    Coarse,
+    /// Semi-implicit Euler at this step [s], as simulators of rigid bodies have it: a flaw to be told from physics.
+    Euler(f64),
+}
+
+impl Precision {
+    fn step(self) -> f64 {
+        match self {
+            Self::Fine => 1e-4,
+            Self::Coarse => 1e-3,
+            Self::Euler(step) => step,
+        }
+    }
+}
+
+/// Positions at even times.
+#[derive(Debug, Clone)]
+pub(super) struct Motion {
+    step: f64,
+    /// One a step, from time 0 on.
+    pub positions: Vec<f64>,
+    before: f64,
+}
+
+impl Motion {
+    /// The position at a time [s]; before the first, where the arm rested.
+    pub fn at(&self, time: f64) -> f64 {
+        let place = time / self.step;
+        if place <= 0.0 {
+            return self.before;
+        }
+        let row = (place as usize).min(self.positions.len().saturating_sub(2));
+        let part = (place - row as f64).min(1.0);
+        self.positions[row] + part * (self.positions[row + 1] - self.positions[row])
+    }
+
+    /// The largest distance from where it began.
+    pub fn reach(&self) -> f64 {
+        self.positions
+            .iter()
+            .fold(0.0, |most: f64, q| if q.is_finite() { most.max((q - self.before).abs()) } else { f64::INFINITY })
+    }
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct State {
+    position: f64,
+    velocity: f64,
+    motor_position: f64,
+    motor_velocity: f64,
+    driver: driver::Memory,
+    load: load::Memory,
+}
+
+impl State {
+    /// `self + step * rate`.
+    fn moved(mut self, step: f64, rate: &Self) -> Self {
+        self.position += step * rate.position;
+        self.velocity += step * rate.velocity;
+        self.motor_position += step * rate.motor_position;
+        self.motor_velocity += step * rate.motor_velocity;
+        self.driver.iter_mut().zip(&rate.driver).for_each(|(value, rate)| *value += step * rate);
+        self.load.iter_mut().zip(&rate.load).for_each(|(value, rate)| *value += step * rate);
+        self
+    }
+}
+
+/// An arm with what acts on it.
+#[derive(Debug, Clone)]
+pub(super) struct Machine {
+    arm: Arm,
+    driver: Driver,
+    load: Load,
+}
+
+impl Machine {
+    pub fn new(arm: Arm, effects: &[Effect]) -> Self {
+        Self { arm, driver: Driver::of(effects), load: Load::of(effects) }
+    }
+
+    pub fn driver(&self) -> &Driver {
+        &self.driver
+    }
+
+    pub fn load(&self) -> &Load {
+        &self.load
+    }
+
+    /// Where the arm is while `drive` lasts; `seed` is for the bus alone.
+    pub fn run(&self, drive: &Drive, precision: Precision, seed: Seed) -> Motion {
+        let step = precision.step().min(drive.sample);
+        let arrivals = self.arrivals(drive, seed);
+        let mut arriving = arrivals.iter().zip(&drive.commands).peekable();
+        let mut state = State {
+            position: drive.start,
+            velocity: drive.speed,
+            motor_position: drive.start,
+            motor_velocity: drive.speed,
+            ..State::default()
+        };
+        let end = drive.sample * drive.commands.len() as f64;
+        let steps = (end / step).round() as usize;
+        let mut command = 0.0;
+        let mut positions = Vec::with_capacity(steps + 1);
+        for k in 0..=steps {
+            positions.push(state.position);
+            let (mut now, until) = (k as f64 * step, (k + 1) as f64 * step);
+            while let Some((at, next)) = arriving.next_if(|(at, _)| **at < until - 1e-9) {
+                state = self.integrate(state, command, now, (at - now).max(0.0), precision);
+                (now, command) = (at.max(now), *next);
+            }
+            state = self.integrate(state, command, now, until - now, precision);
+            if !(state.position.abs() < 1e6) {
+                positions.resize(steps + 1, f64::NAN);
+                break;
+            }
+        }
+        Motion { step, positions, before: drive.start }
+    }
+
+    /// When each command reaches the driver [s], in order.
+    fn arrivals(&self, drive: &Drive, seed: Seed) -> Vec<f64> {
+        let (delay, jitter) = self.driver.bus;
+        let mut rng = seed.stream("bus");
+        let mut last = 0.0_f64;
+        (0..drive.commands.len())
+            .map(|row| {
+                let wobble: f64 = StandardNormal.sample(&mut rng);
+                last = last.max(drive.time(row) + (delay + jitter * wobble.clamp(-3.0, 3.0)).max(0.0));
+                last
+            })
+            .collect()
+    }
+
+    /// Integrates over `duration` [s] under one command, in steps that what is stiff can bear.
+    fn integrate(&self, mut state: State, command: f64, mut time: f64, duration: f64, precision: Precision) -> State {
+        let mut left = duration;
+        let driver = self.driver.fastest();
+        let patience = if precision == Precision::Fine { 0.7 } else { 1.6 };
+        while left > 1e-12 {
+            if let Precision::Euler(_) = precision {
+                return self.euler(state, command, time, left);
+            }
+            let fastest =
+                driver.max(self.load.fastest(self.arm.inertia, state.position, state.velocity, state.motor_velocity));
+            let step = left.min(precision.step()).min(if fastest > 0.0 { patience / fastest } else { f64::INFINITY });
+            let step = if left - step < 0.1 * step { left } else { step };
+            state = self.runge_kutta(state, command, time, step);
+            time += step;
+            left -= step;
+        }
+        state
+    }
+
+    fn runge_kutta(&self, state: State, command: f64, time: f64, step: f64) -> State {
+        let k1 = self.rates(&state, command, time);
+        let k2 = self.rates(&state.moved(0.5 * step, &k1), command, time + 0.5 * step);
+        let k3 = self.rates(&state.moved(0.5 * step, &k2), command, time + 0.5 * step);
+        let k4 = self.rates(&state.moved(step, &k3), command, time + step);
+        state.moved(step / 6.0, &k1).moved(step / 3.0, &k2).moved(step / 3.0, &k3).moved(step / 6.0, &k4)
+    }
+
+    fn euler(&self, state: State, command: f64, time: f64, step: f64) -> State {
+        let rates = self.rates(&state, command, time);
+        let velocity = state.velocity + step * rates.velocity;
+        let position = state.position + step * velocity;
+        State { position, velocity, motor_position: position, motor_velocity: velocity, ..state.moved(step, &rates) }
+    }
+
+    /// Time derivatives of the state.
+    fn rates(&self, state: &State, command: f64, time: f64) -> State {
+        let (output, driver) = self.driver.act(&state.driver, command, time);
+        let (more_inertia, more_gravity) = self.load.mass(time);
+        let gravity = (self.arm.gravity_torque + more_gravity) * self.load.gravity_factor(time);
+        let weight = if gravity == 0.0 { 0.0 } else { gravity * state.position.sin() };
+        let motor = self.arm.gain * output;
+        let coupled = self.load.coupling.as_ref();
+        let rubbing = if coupled.is_some() { state.motor_velocity } else { state.velocity };
+        let now = Instant { position: state.position, velocity: state.velocity, rubbing, motor, weight, time };
+        let (against, load) = self.load.act(&now, &state.load);
+        let at_motor = motor - self.arm.viscous_friction * rubbing - against.friction;
+        let at_link = -weight - against.link;
+        let (velocity, motor_velocity) = match coupled {
+            Some(coupling) => {
+                let own = self.arm.inertia * coupling.motor_share;
+                let twist = state.motor_position - state.position;
+                let passed = coupling.torque(twist, state.motor_velocity - state.velocity);
+                let link = self.arm.inertia - own + more_inertia;
+                ((at_link + passed) / link, (at_motor - passed) / own)
+            }
+            None => {
+                let (factor, slope) = self.load.inertia_factor(state.position);
+                let bent = 0.5 * self.arm.inertia * slope * state.velocity * state.velocity;
+                let rate = (at_motor + at_link - bent) / (self.arm.inertia * factor + more_inertia);
+                (rate, rate)
+            }
+        };
+        State { position: state.velocity, velocity, motor_position: rubbing, motor_velocity, driver, load }
+    }
+}
