@@ -25,10 +25,16 @@ use crate::sim2real::mechanism::{
 macro_rules! rows {
     // A plant with a coordinate that moves.
     (motion, delays $delays:expr, rates $rates:expr) => {
-        rows!(signals, delays $delays, rates $rates, &ConstantLoad, &CoulombFriction, &QuadraticDrag, &Stiffness)
+        rows!(
+            signals, delays $delays, rates $rates,
+            plant [&ConstantLoad, &CoulombFriction, &QuadraticDrag, &Stiffness],
+            sensor [&Rectification, &Eccentricity]
+        )
     };
     // Any plant whose commands and observations are signals.
-    (signals, delays $delays:expr, rates $rates:expr, $($own:expr),*) => {
+    (
+        signals, delays $delays:expr, rates $rates:expr, plant [$($own:expr),*], sensor [$($read:expr),*]
+    ) => {
         &[
             &CommandDelay { longest: $delays.0, starts: $delays.1, smooth: true },
             &DeadZone,
@@ -42,8 +48,7 @@ macro_rules! rows {
             &Drift,
             &Scale,
             &Quantization,
-            &Rectification,
-            &Eccentricity,
+            $($read,)*
             &ObservationDelay { longest: $delays.0, starts: $delays.1, rates: $rates },
             &Dropout,
             &Noise,
@@ -64,8 +69,8 @@ pub static MECHANISMS: Registry<Joint> = rows!(motion, delays OF_SERVOS, rates &
 /// The registry of a cart with a pole: mechanisms of motion act on the cart.
 pub static CART_POLE_MECHANISMS: Registry<CartPole> = rows!(motion, delays OF_SERVOS, rates &[(0, 1), (2, 3)]);
 
-/// The registry of two tanks.
-pub static TANKS_MECHANISMS: Registry<Tanks> = rows!(signals, delays OF_PROCESSES, rates &[], &Overflow);
+/// The registry of two tanks: levels are not below 0, and no encoder turns with them.
+pub static TANKS_MECHANISMS: Registry<Tanks> = rows!(signals, delays OF_PROCESSES, rates &[], plant [&Overflow], sensor []);
 
 #[cfg(test)]
 mod tests {
