@@ -1,12 +1,11 @@
 //! Robots: plants that move, and what their simulators tend to leave out.
 
 mod cart_pole;
+mod equations;
 mod estimate;
-mod expression;
 mod joint;
 pub mod mechanism;
 mod mover;
-mod program;
 mod runge_kutta;
 mod signal;
 mod tanks;
@@ -14,8 +13,12 @@ mod tanks;
 mod twin;
 
 pub use cart_pole::{CartPole, CartPoleDynamics, CartPoleView};
+pub use equations::{
+    Attachment, Driving, EquationError, EquationSystem, Equations, EquationsDynamics, InputVariable, Measurements,
+    OutputVariable, Outputs, StateVariable,
+};
 pub use joint::{Axis, Joint, JointDynamics, Posture};
-pub use mechanism::{CART_POLE_MECHANISMS, MECHANISMS, TANKS_MECHANISMS};
+pub use mechanism::{CART_POLE_MECHANISMS, EQUATIONS_MECHANISMS, MECHANISMS, TANKS_MECHANISMS};
 pub use mover::{Motion, Mover, Push};
 pub use signal::{Commands, Signal};
 pub use tanks::{Level, Levels, Rims, Tanks, TanksDynamics};

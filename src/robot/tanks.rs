@@ -79,8 +79,7 @@ impl Tanks {
             .into_iter()
             .zip(values.iter().zip(uncertainty))
             .map(|((name, unit), (value, uncertainty))| {
-                let mut parameter = Parameter::new(name, "", *value).known_to((uncertainty * value).abs());
-                parameter.unit = unit.into();
+                let parameter = Parameter::named(name, unit, *value).known_to((uncertainty * value).abs());
                 if name == "pump_gain" { parameter } else { parameter.within(0.0, f64::INFINITY) }
             })
             .collect();

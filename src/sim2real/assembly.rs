@@ -290,13 +290,13 @@ impl<P: Plant> Assembly<P> {
             if row + 1 == rows.end {
                 break;
             }
-            let command = recording.stimulus.command(row);
             let interval = recording.time[row + 1] - time;
             let substeps = self.clock().substeps(interval);
             let step = interval / substeps as f64;
             for sub in 0..substeps {
                 let tick = Tick { index: row, time: time + sub as f64 * step, step };
-                run.send(tick, &command);
+                let share = (sub as f64 + 0.5) / substeps as f64;
+                run.send(tick, &recording.stimulus.command_within(row, share));
                 if row >= rows.start {
                     run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
                 }

@@ -53,6 +53,10 @@ pub trait Observation: Clone + Default + Send + 'static {
 pub trait Stimulus<P: Plant>: Send + Sync {
     /// The command of row `row`, in force from its time on.
     fn command(&self, row: usize) -> P::Command;
+    /// The same during the part of the row about `share` of the way to the next: another where a signal does not hold.
+    fn command_within(&self, row: usize, _share: f64) -> P::Command {
+        self.command(row)
+    }
     /// What the plant meets in row `row`, given the command as it arrives.
     fn input(&self, row: usize, arriving: &P::Command) -> P::Input;
 }

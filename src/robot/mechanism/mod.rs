@@ -12,7 +12,7 @@ pub use overflow::Overflow;
 pub use quadratic_drag::QuadraticDrag;
 pub use stiffness::Stiffness;
 
-use super::{CartPole, Joint, Tanks};
+use super::{CartPole, Equations, Joint, Tanks};
 use crate::sim2real::Registry;
 use crate::sim2real::mechanism::{
     ActuatorLag, Bias, CommandDelay, DeadZone, Drift, Dropout, Eccentricity, GainError, Noise, ObservationDelay,
@@ -63,6 +63,9 @@ const OF_SERVOS: Delays = (0.5, &[0.004, 0.02, 0.08]);
 /// Of what is sampled by the second.
 const OF_PROCESSES: Delays = (120.0, &[1.0, 4.0, 16.0]);
 
+/// Of what may be either.
+const OF_ANYTHING: Delays = (120.0, &[0.004, 0.02, 0.08, 1.0, 4.0]);
+
 /// The joint's registry.
 pub static MECHANISMS: Registry<Joint> = rows!(motion, delays OF_SERVOS, rates &[(0, 1)]);
 
@@ -71,6 +74,9 @@ pub static CART_POLE_MECHANISMS: Registry<CartPole> = rows!(motion, delays OF_SE
 
 /// The registry of two tanks: levels are not below 0, and no encoder turns with them.
 pub static TANKS_MECHANISMS: Registry<Tanks> = rows!(signals, delays OF_PROCESSES, rates &[], plant [&Overflow], sensor []);
+
+/// The registry of equations, which may be of anything; mechanisms of motion act where the equations say what moves.
+pub static EQUATIONS_MECHANISMS: Registry<Equations> = rows!(motion, delays OF_ANYTHING, rates &[]);
 
 #[cfg(test)]
 mod tests {
