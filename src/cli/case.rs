@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use crate::io::{InputError, TwinFile, hint_among};
 use crate::market::execution_twin;
 use crate::robot::{
-    cart_pole_assembly, cart_pole_recordings, joint_assembly, joint_recordings, tanks_assembly, tanks_recordings,
+    cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
+    tanks_assembly, tanks_recordings,
 };
 use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, calibrate, diagnose};
 use crate::sim2real::{Assembly, Parameter, Plant, Recording, Seed, Simulator};
@@ -14,7 +15,7 @@ use super::fitted::FittedTwin;
 use super::screen::Progress;
 
 /// The models a twin can name.
-const MODELS: [&str; 4] = ["joint", "cart_pole", "tanks", "execution"];
+const MODELS: [&str; 5] = ["joint", "cart_pole", "tanks", "equations", "execution"];
 
 /// A twin with its recordings, whatever they are of.
 pub(super) struct Case(Box<dyn Trial>);
@@ -65,6 +66,11 @@ impl Case {
                 let recordings = tanks_recordings(twin, recordings)?;
                 let assembly = tanks_assembly(twin, &recordings)?;
                 Box::new(Given { twin: assembly, recordings, held_out: tanks_recordings(twin, held_out)? })
+            }
+            "equations" => {
+                let recordings = equations_recordings(twin, recordings)?;
+                let assembly = equations_assembly(twin, &recordings)?;
+                Box::new(Given { twin: assembly, recordings, held_out: equations_recordings(twin, held_out)? })
             }
             "execution" => {
                 // Read together, so that the tape is read once.

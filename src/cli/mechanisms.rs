@@ -5,7 +5,9 @@ use serde::Serialize;
 
 use crate::market::{self, Execution};
 use crate::report::quantity::number;
-use crate::robot::{CART_POLE_MECHANISMS, CartPole, Joint, MECHANISMS, TANKS_MECHANISMS, Tanks};
+use crate::robot::{
+    CART_POLE_MECHANISMS, CartPole, EQUATIONS_MECHANISMS, Equations, Joint, MECHANISMS, TANKS_MECHANISMS, Tanks,
+};
 use crate::sim2real::{About, Parameter, Plant, Registry, Site};
 
 use super::screen::Screen;
@@ -83,6 +85,7 @@ fn rows() -> Vec<Row> {
     add::<Joint>(&mut rows, "robot", "joint", MECHANISMS);
     add::<CartPole>(&mut rows, "robot", "cart_pole", CART_POLE_MECHANISMS);
     add::<Tanks>(&mut rows, "robot", "tanks", TANKS_MECHANISMS);
+    add::<Equations>(&mut rows, "robot", "equations", EQUATIONS_MECHANISMS);
     add::<Execution>(&mut rows, "market", "execution", market::MECHANISMS);
     rows.sort_by_key(|row| match row.site {
         Site::Command => 0,

@@ -24,5 +24,6 @@ pub use signal::{Commands, Signal};
 pub use tanks::{Level, Levels, Rims, Tanks, TanksDynamics};
 #[cfg(feature = "io")]
 pub use twin::{
-    cart_pole_assembly, cart_pole_recordings, joint_assembly, joint_recordings, tanks_assembly, tanks_recordings,
+    cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
+    tanks_assembly, tanks_recordings,
 };

@@ -2,6 +2,7 @@
 //! is sampled stands here, the rest in a file for each.
 
 mod cart_pole;
+mod equations;
 mod joint;
 mod tanks;
 
@@ -15,6 +16,7 @@ use crate::io::{
 use crate::sim2real::{Assembly, Measured, Plant, Recording, Registry};
 
 pub use cart_pole::{cart_pole_assembly, cart_pole_recordings};
+pub use equations::{equations_assembly, equations_recordings};
 pub use joint::{joint_assembly, joint_recordings};
 pub use tanks::{tanks_assembly, tanks_recordings};
 

@@ -58,6 +58,16 @@ impl Driving {
     }
 }
 
+impl Driving {
+    /// The inputs of the first row, the command first; nothing where there is no row.
+    #[must_use]
+    pub fn first_row(&self) -> Vec<f64> {
+        let others = self.measured.first().and_then(|row| row.0.as_ref());
+        let others = others.into_iter().flat_map(|row| row.inputs.iter().map(|(value, _)| *value));
+        self.commands.first().copied().into_iter().chain(others).collect()
+    }
+}
+
 impl AsRef<[f64]> for Driving {
     fn as_ref(&self) -> &[f64] {
         &self.commands
