@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant, Recording, Scene, Seed,
-    Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+    Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant, Recording,
+    Scene, Seed, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
 };
 
 /// The mechanisms a domain knows: one row each.
@@ -238,7 +238,8 @@ impl<P: Plant> Simulator for Assembly<P> {
 
     fn clock(&self) -> Clock {
         match (self.plant.clock(), self.step) {
-            (Clock::Sampled { .. }, Some(longest_step)) => Clock::Sampled { longest_step },
+            // A plant of no longest step is not integrated: it goes from row to row.
+            (Clock::Sampled { longest_step: own }, Some(longest_step)) if own.is_finite() => Clock::Sampled { longest_step },
             (clock, _) => clock,
         }
     }
@@ -339,13 +340,13 @@ impl<P: Plant> Assembly<P> {
             if row + 1 == rows.end {
                 break;
             }
-            let command = recording.stimulus.command(row);
             let interval = recording.time[row + 1] - time;
             let substeps = self.clock().substeps(interval);
             let step = interval / substeps as f64;
             for sub in 0..substeps {
                 let tick = Tick { index: row, time: time + sub as f64 * step, step };
-                run.send(tick, &command);
+                let share = (sub as f64 + 0.5) / substeps as f64;
+                run.send(tick, &recording.stimulus.command_within(row, share));
                 if row >= rows.start {
                     run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
                 }
@@ -375,7 +376,7 @@ struct Follow {
 impl Follow {
     fn new(channels: &[Channel], lanes: usize, rows: usize, every: Option<usize>) -> Self {
         let one: Trajectory =
-            channels.iter().map(|c| Simulated { channel: c.name.to_owned(), samples: Vec::with_capacity(rows) }).collect();
+            channels.iter().map(|c| Simulated { channel: c.name.to_string(), samples: Vec::with_capacity(rows) }).collect();
         // A clone of an empty vector has no capacity: reserve in each lane.
         let mut trajectories = vec![one; lanes];
         trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
@@ -407,7 +408,7 @@ impl<P: Plant> Twin for Assembly<P> {
             }
             for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {
                 let known = recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus));
-                if known && mechanism.followed(form_index) {
+                if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
                     candidates.push(Candidate { about, form, form_index });
                 }
             }

@@ -35,7 +35,7 @@ pub fn check_plant<P: Plant>(plant: &P, registry: Registry<P>, recording: &Recor
     let lane = start(&assembly, recording, &[]);
     let alone = follow(&assembly, recording, std::slice::from_ref(&lane));
     let names: Vec<&str> = alone[0].iter().map(|s| s.channel.as_str()).collect();
-    if names != plant.channels().iter().map(|c| c.name).collect::<Vec<_>>() {
+    if names != plant.channels().iter().map(|c| c.name.as_ref()).collect::<Vec<_>>() {
         return fail(format!("channels are {names:?}"));
     }
     if alone[0].iter().any(|s| s.samples.len() != recording.len()) {
@@ -79,7 +79,7 @@ pub fn check_mechanism<P: Plant>(
         if form.parameters.len() != plain[index].parameters.len() {
             return fail(format!("form {index} changes its number of parameters with the recording"));
         }
-        if !mechanism.applies(index, plant, &recording.stimulus) {
+        if !plant.open_to(mechanism.site(index)) || !mechanism.applies(index, plant, &recording.stimulus) {
             continue;
         }
         let with = bare.clone().with_mechanism(mechanism, index, form.parameters.clone());

@@ -121,7 +121,8 @@ fn activity<T: Twin>(
             *sum = (sum.0 + apart.iter().map(|d| d * d).sum::<f64>(), sum.1 + apart.len());
         }
         // Orders do not wait for one another: each shows by itself what was done to it.
-        let local = if event { None } else { selected.twin.rollout_rejoined(&lanes, recording, rows, TOGETHER, inquiry.seed) };
+        let local =
+            if event { None } else { selected.twin.rollout_rejoined(&lanes, recording, rows, TOGETHER, inquiry.seed) };
         deeds.extend(deeds_of(inquiry, number, part, &local.unwrap_or(free), if event { 1 } else { TOGETHER }));
     }
     let moved = moved
@@ -157,7 +158,8 @@ fn deeds_of<T: Twin>(
 ) -> Vec<Deed> {
     let apart: Vec<(Vec<f64>, f64)> =
         inquiry.evidence.weights.iter().map(|w| (difference(runs, &w.channel), w.noise)).collect();
-    let size = |row: usize| apart.iter().filter_map(|(d, noise)| d.get(row).map(|d| (d / noise).powi(2))).sum::<f64>().sqrt();
+    let size =
+        |row: usize| apart.iter().filter_map(|(d, noise)| d.get(row).map(|d| (d / noise).powi(2))).sum::<f64>().sqrt();
     let rows = part.followed().len();
     // The difference of a window shows in its last row but one step on, where the lanes meet again.
     let offset = usize::from(together > 1);
@@ -173,7 +175,7 @@ fn deeds_of<T: Twin>(
 
 fn unit<T: Twin>(inquiry: &Inquiry<'_, T>, name: &str) -> String {
     let known = inquiry.twin.channels().iter().find(|c| c.name == name);
-    known.map(|c| inquiry.twin.unit(c.unit)).unwrap_or_default()
+    known.map(|c| inquiry.twin.unit(&c.unit)).unwrap_or_default()
 }
 
 /// When that was, in words and as stretches.
@@ -278,7 +280,11 @@ impl Rule {
         let (mut acting_below, mut resting_below) = (0_u32, 0_u32);
         let mut best: Option<Self> = None;
         for (at, pair) in order.windows(2).enumerate() {
-            if acts[pair[0]] { acting_below += 1 } else { resting_below += 1 }
+            if acts[pair[0]] {
+                acting_below += 1
+            } else {
+                resting_below += 1
+            }
             let (below, above) = (values[pair[0]], values[pair[1]]);
             if below == above || !at.is_multiple_of(every) {
                 continue;

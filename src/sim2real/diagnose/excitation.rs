@@ -100,7 +100,8 @@ fn sines(low: f64, high: f64, duration: f64, seed: Seed, number: usize) -> Shape
         .collect();
     // Higher tones are smaller, as a servo's commands are.
     let weight = |k: usize| 1.0 / (1.0 + k as f64 / 3.0);
-    let sum = move |x: f64| tones.iter().enumerate().map(|(k, (rate, phase))| weight(k) * (rate * x + phase).sin()).sum::<f64>();
+    let sum =
+        move |x: f64| tones.iter().enumerate().map(|(k, (rate, phase))| weight(k) * (rate * x + phase).sin()).sum::<f64>();
     let peak = (0..2_000).map(|i| sum(f64::from(i) / 2_000.0).abs()).fold(0.0, f64::max);
     Box::new(move |x| sum(x) / peak)
 }
@@ -115,8 +116,7 @@ fn triangle(turns: f64) -> f64 {
 fn levels(count: f64, seed: Seed) -> Shape<'static> {
     let mut rng = seed.stream("next experiment levels");
     let number = count.ceil() as usize + 1;
-    let levels: Vec<f64> =
-        (0..number).map(|k| if k % 4 == 3 { 0.0 } else { rng.random_range(-1.0..1.0) }).collect();
+    let levels: Vec<f64> = (0..number).map(|k| if k % 4 == 3 { 0.0 } else { rng.random_range(-1.0..1.0) }).collect();
     let largest = levels.iter().fold(0.0_f64, |m, l| m.max(l.abs())).max(1e-12);
     Box::new(move |x| levels[((x * count) as usize).min(number - 1)] / largest)
 }

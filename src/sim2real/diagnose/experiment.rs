@@ -13,7 +13,7 @@ use super::rivals::Place;
 use super::select::Selection;
 use super::words::figure;
 use super::{Effect, NextExperiment, Verdict};
-use crate::sim2real::identify::{Problem, State, fit_smooth};
+use crate::sim2real::identify::{Effort, Problem, State, fit_smooth};
 use crate::sim2real::{Part, Recording, Thetas, Twin};
 
 /// Name of the file with the commands.
@@ -46,7 +46,8 @@ pub(super) fn next<T: Twin>(
     let own: Vec<&str> = effects.iter().map(|e| e.mechanism.as_str()).collect();
     let all: Vec<&str> = others.iter().map(|(name, _)| name.as_str()).collect();
     let Some(best) = Design::of(inquiry, &selection.selected, &others).and_then(|design| design.best()) else {
-        let what = format!("record with other amplitudes and frequencies, so that {} no longer look alike", pair(&own, &all));
+        let what =
+            format!("record with other amplitudes and frequencies, so that {} no longer look alike", pair(&own, &all));
         return Some((advice(what, &own, &all), None));
     };
     let told = |tells: bool| -> Vec<&str> {
@@ -134,7 +135,7 @@ fn contenders<T: Twin>(
     let fitted = kept.par_iter().filter_map(|(place, number)| {
         let less = selection.without.get(*place)?;
         let screened = inquiry.screened(less).into_iter().find(|s| s.number == *number)?;
-        Some((name(*number).to_owned(), inquiry.extended(less, *number, &screened)))
+        Some((name(*number).to_owned(), inquiry.extended(less, *number, &screened, Effort::Thorough)))
     });
     fitted.collect()
 }
@@ -162,11 +163,7 @@ struct Design<'a, 'b, T: Twin> {
 }
 
 impl<'a, 'b, T: Twin> Design<'a, 'b, T> {
-    fn of(
-        inquiry: &'a Inquiry<'b, T>,
-        selected: &'a Hypothesis<T>,
-        others: &'a [(String, Hypothesis<T>)],
-    ) -> Option<Self> {
+    fn of(inquiry: &'a Inquiry<'b, T>, selected: &'a Hypothesis<T>, others: &'a [(String, Hypothesis<T>)]) -> Option<Self> {
         let parts = &inquiry.evidence.free_run;
         let base = parts.first()?.recording;
         let mut used: Option<[f64; 2]> = None;
@@ -183,8 +180,7 @@ impl<'a, 'b, T: Twin> Design<'a, 'b, T> {
         let rows = ((LONGEST / spacing) as usize).clamp(ROWS.0, ROWS.1);
         let channel = &inquiry.evidence.weights.first()?.channel;
         let values = parts.iter().filter_map(|p| p.recording.channel(channel)).flat_map(|m| m.samples.iter().flatten());
-        let (low, high) =
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
         let room = BEYOND * (high - low);
         let family = family(rows, spacing, used, inquiry.seed);
         Some(Self { inquiry, selected, others, base, family, within: [low - room, high + room] })
@@ -195,8 +191,7 @@ impl<'a, 'b, T: Twin> Design<'a, 'b, T> {
         let worth = |gains: &[f64]| gains.iter().map(|gain| gain.ln_1p()).sum::<f64>();
         let of = |k: usize, refitted: bool| self.gains(&self.recording(&self.family[k])?, true, refitted);
         let all: Vec<usize> = (0..self.family.len()).collect();
-        let mut ranked: Vec<(usize, f64)> =
-            all.par_iter().filter_map(|k| Some((*k, worth(&of(*k, false)?.0)))).collect();
+        let mut ranked: Vec<(usize, f64)> = all.par_iter().filter_map(|k| Some((*k, worth(&of(*k, false)?.0)))).collect();
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         ranked.truncate(REFITTED);
         let refitted: Vec<(usize, Vec<f64>, usize)> = ranked

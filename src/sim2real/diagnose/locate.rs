@@ -77,7 +77,7 @@ pub(super) fn located<T: Twin>(
         found.intervals.extend(intervals(&own));
         let unit = |name: &str| {
             let known = inquiry.twin.channels().iter().find(|c| c.name == name);
-            known.map(|c| inquiry.twin.unit(c.unit)).unwrap_or_default()
+            known.map(|c| inquiry.twin.unit(&c.unit)).unwrap_or_default()
         };
         found.against.extend(against(&own, inquiry.twin.clock(), &unit));
     }
@@ -203,8 +203,7 @@ fn against(tracks: &[&Track], clock: Clock, unit: &dyn Fn(&str) -> String) -> Ve
             let signed = range(&first.channel, &name, &unit, &values, &residual);
             let both = values.iter().any(|v| *v < 0.0) && values.iter().any(|v| *v > 0.0);
             let size: Vec<f64> = values.iter().map(|v| v.abs()).collect();
-            let unsigned =
-                if both { range(&first.channel, &format!("|{name}|"), &unit, &size, &residual) } else { None };
+            let unsigned = if both { range(&first.channel, &format!("|{name}|"), &unit, &size, &residual) } else { None };
             // Of a size and its two signs the size is said more simply.
             let unsigned = unsigned.map(|(distance, bin)| (SIMPLER * distance, bin));
             [signed, unsigned].into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0))
@@ -227,7 +226,8 @@ fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) 
     let squares = |rows: &[usize]| rows.iter().map(|i| residual[*i] * residual[*i]).sum::<f64>();
     let (total, count) = (squares(&order), order.len() as f64);
     let shares: Vec<(f64, f64)> = bins.iter().map(|b| (squares(b) / total, b.len() as f64 / count)).collect();
-    let distance: f64 = shares.iter().filter(|(error, _)| *error > 0.0).map(|(error, rows)| error * (error / rows).ln()).sum();
+    let distance: f64 =
+        shares.iter().filter(|(error, _)| *error > 0.0).map(|(error, rows)| error * (error / rows).ln()).sum();
     let density = |k: usize| shares[k].0 / shares[k].1;
     let densest = (0..bins.len()).max_by(|a, b| density(*a).total_cmp(&density(*b)))?;
     let low = (0..densest).rev().take_while(|k| density(*k) > WORSE).last().unwrap_or(densest);
@@ -236,9 +236,8 @@ fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) 
     // What holds in one half of the recordings only is a matter of time, not of state.
     let half = |parity: bool| {
         let inside: Vec<usize> = bins[low..=high].iter().flat_map(|b| b.iter().copied()).collect();
-        let own = |rows: &[usize]| -> Vec<usize> {
-            rows.iter().copied().filter(|i| (2 * i >= values.len()) == parity).collect()
-        };
+        let own =
+            |rows: &[usize]| -> Vec<usize> { rows.iter().copied().filter(|i| (2 * i >= values.len()) == parity).collect() };
         let (inside, all) = (own(&inside), own(&order));
         let (of_error, of_rows) = (squares(&inside) / squares(&all), inside.len() as f64 / all.len().max(1) as f64);
         on == "time" || of_error > WORSE * of_rows
@@ -295,13 +294,7 @@ mod tests {
                 noise + more(*t, *v)
             })
             .collect();
-        Track {
-            channel: "position".into(),
-            recording: "r".into(),
-            time,
-            residual,
-            covariates: vec![("velocity", velocity)],
-        }
+        Track { channel: "position".into(), recording: "r".into(), time, residual, covariates: vec![("velocity", velocity)] }
     }
 
     fn of(track: &Track) -> Vec<Bin> {
@@ -330,7 +323,10 @@ mod tests {
     fn finds_the_states_that_are_off() {
         let slow = of(&track(|t, v| if v.abs() < 0.2 { 5.0 * (7.0 * t).cos() } else { 0.0 }));
         assert_eq!(slow[0].on, "|velocity|", "{slow:?}");
-        assert!(slow[0].from.is_none() && (slow[0].to.unwrap() - 0.2).abs() < 0.1 && slow[0].share_of_error > 0.6, "{slow:?}");
+        assert!(
+            slow[0].from.is_none() && (slow[0].to.unwrap() - 0.2).abs() < 0.1 && slow[0].share_of_error > 0.6,
+            "{slow:?}"
+        );
         let forward = of(&track(|_, v| if v > 0.9 { 4.0 } else { 0.0 }));
         assert_eq!(forward[0].on, "velocity", "{forward:?}");
         assert!(forward[0].to.is_none() && (forward[0].from.unwrap() - 0.9).abs() < 0.15, "{forward:?}");

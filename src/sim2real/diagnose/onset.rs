@@ -146,7 +146,12 @@ fn explained(information: &DMatrix<f64>, score: &DVector<f64>) -> f64 {
     let eigen = information.clone().symmetric_eigen();
     let most = eigen.eigenvalues.max();
     let along = eigen.eigenvectors.tr_mul(score);
-    along.iter().zip(&eigen.eigenvalues).filter(|(_, value)| **value > DETERMINED * most).map(|(s, value)| s * s / value).sum()
+    along
+        .iter()
+        .zip(&eigen.eigenvalues)
+        .filter(|(_, value)| **value > DETERMINED * most)
+        .map(|(s, value)| s * s / value)
+        .sum()
 }
 
 /// What is left of the rows from `from` to `to` once their own parameters are fitted to them.
@@ -197,12 +202,7 @@ const TRIED: usize = 3;
 /// The date at which the twin, started afresh there with parameters of its own, explains the rows before and after best.
 ///
 /// Scores of a run that passes through the change miss that the motion before it goes on for a while after it.
-fn refined<T: Twin>(
-    inquiry: &Inquiry<'_, T>,
-    hypothesis: &Hypothesis<T>,
-    whole: &Part<'_, T::Stimulus>,
-    first: f64,
-) -> f64 {
+fn refined<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, whole: &Part<'_, T::Stimulus>, first: f64) -> f64 {
     let time = &whole.recording.time;
     let (start, end) = (time[whole.rows.start], time[whole.rows.end - 1]);
     let free: Vec<usize> =
@@ -226,9 +226,8 @@ fn refined<T: Twin>(
     let mut best = first;
     for reach in REACHES {
         let step = reach * (end - start) / TRIED as f64;
-        let dates: Vec<f64> = (0..=2 * TRIED)
-            .map(|k| (best + (k as f64 - TRIED as f64) * step).clamp(start + margin, end - margin))
-            .collect();
+        let dates: Vec<f64> =
+            (0..=2 * TRIED).map(|k| (best + (k as f64 - TRIED as f64) * step).clamp(start + margin, end - margin)).collect();
         let misfits: Vec<f64> = dates.par_iter().map(|date| misfit(*date)).collect();
         let least = dates.iter().zip(&misfits).min_by(|a, b| a.1.total_cmp(b.1));
         best = least.map_or(best, |(date, _)| *date);
