@@ -17,6 +17,7 @@ mod hypothesis;
 mod locate;
 mod noise;
 mod onset;
+mod profile;
 mod prove;
 mod recognize;
 mod rivals;
@@ -36,6 +37,7 @@ pub use excitation::Excitation;
 pub use experiment::EXPERIMENT_FILE;
 pub use hypothesis::Hypothesis;
 pub use noise::channel_weights;
+pub use profile::Profile;
 
 use hypothesis::Inquiry;
 use prove::Contest;
@@ -86,6 +88,8 @@ pub struct Outcome<T> {
     pub std: Vec<f64>,
     /// Measurements beside the three twins.
     pub comparisons: Vec<Comparison>,
+    /// Errors over the states they may depend on.
+    pub profiles: Vec<Profile>,
     /// The commands of the next experiment, where one was designed.
     pub excitation: Option<Excitation>,
 }
@@ -182,6 +186,7 @@ fn followed<T: Twin>(
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
     let activities = activity::activities(&inquiry, &selection.selected, &trued, &covariates);
     activity::tell(&mut diagnosis, &inquiry, &selection.selected, activities);
+    let profiles = profile::profiles(&inquiry, &selection.recalibrated, &selection.selected, &covariates);
     progress("designing the next experiment", 0, 1);
     let next = experiment::next(&inquiry, &selection, &rivals, diagnosis.verdict, &diagnosis.effects);
     let excitation = next.and_then(|(next, excitation)| {
@@ -194,7 +199,7 @@ fn followed<T: Twin>(
         values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
         std.resize(values.len(), 0.0);
     }
-    Outcome { diagnosis, trued: trued_twin, values, std, comparisons, excitation }
+    Outcome { diagnosis, trued: trued_twin, values, std, comparisons, profiles, excitation }
 }
 
 /// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.
