@@ -156,7 +156,7 @@ fn touch(wall: &Wall, motor: Motion, link: Motion, half: f64, step: f64) -> Coup
 mod tests {
     use super::*;
     use crate::robot::Joint;
-    use crate::robot::Torque;
+    use crate::robot::Signal;
     use crate::robot::mechanism::trial::Trial;
 
     /// A triangle of amplitude A leaves play of width w as one of amplitude A - w / 2, late by w / 2 on every flank.
@@ -168,7 +168,7 @@ mod tests {
         for k in 0..4_000 {
             let phase = f64::from(k) / 1_000.0;
             let u = 1.0 - ((phase + 1.0).rem_euclid(4.0) - 2.0).abs();
-            let mut commands = [Torque(u)];
+            let mut commands = [Signal(u)];
             law.shape(tick, &mut commands);
             passed.push((u, commands[0].0));
         }
@@ -210,7 +210,7 @@ mod tests {
         let mut impulse = 0.0;
         for k in 0..3_000 {
             let tick = Tick { index: k, time: k as f64 * step, step };
-            let commands = [Torque(0.3 * (11.0 * tick.time).sin())];
+            let commands = [Signal(0.3 * (11.0 * tick.time).sin())];
             let mut effects = [crate::robot::Push::default()];
             let scene = Scene { dynamics: &dynamics, states: &states, inputs: &[()], commands: &commands };
             Law::<Joint>::act(&mut law, tick, &scene, &mut effects);
