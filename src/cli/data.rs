@@ -73,7 +73,7 @@ pub(super) fn prepared(set: &Set, folder: &Path, overwrite: Overwrite) -> Result
 }
 
 /// The table as it goes into the file `name`.
-fn output_table(table: &conceal::Table, name: &str) -> OutputTable {
+pub(super) fn output_table(table: &conceal::Table, name: &str) -> OutputTable {
     let typed_times = name.ends_with(".parquet");
     let columns = table.columns().iter();
     columns.fold(OutputTable::new(), |out, (name, column)| out.with(name, values(column, typed_times)))

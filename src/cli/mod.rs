@@ -12,6 +12,7 @@ mod diagnose;
 mod figures;
 mod fitted;
 mod mechanisms;
+mod prove;
 mod screen;
 mod stop;
 
@@ -52,6 +53,7 @@ enum Command {
     Calibrate(calibrate::Calibrate),
     Backtest(backtest::Run),
     Mechanisms(mechanisms::Mechanisms),
+    Prove(prove::Prove),
     Data(data::Data),
 }
 
@@ -91,6 +93,7 @@ impl Command {
             Self::Calibrate(command) => command.run(screen),
             Self::Backtest(command) => command.run(screen),
             Self::Mechanisms(command) => command.run(screen),
+            Self::Prove(command) => command.run(screen),
             Self::Data(command) => command.run(screen),
         }
     }

@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant, Recording,
-    Scene, Seed, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+    About, Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant,
+    Recording, Scene, Seed, Signs, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
 };
 
 /// The mechanisms a domain knows: one row each.
@@ -34,6 +34,8 @@ pub struct Assembly<P: Plant> {
     excluded: Vec<String>,
     /// Longest step of integration [s], where it is not the plant's own.
     step: Option<f64>,
+    /// Whether what is random stays out of rollouts.
+    quiet: bool,
 }
 
 impl<P: Plant> fmt::Debug for Assembly<P> {
@@ -53,6 +55,7 @@ impl<P: Plant> Assembly<P> {
             parts: Vec::new(),
             excluded: Vec::new(),
             step: None,
+            quiet: false,
         }
     }
 
@@ -126,6 +129,7 @@ impl<P: Plant> Assembly<P> {
             let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
             let law = part.mechanism.law(part.form, &thetas.block(at, count), seed.child(about.name));
             match part.mechanism.site(part.form) {
+                _ if self.quiet && !part.mechanism.followed(part.form) => {}
                 Site::Command => run.command_laws.push(law),
                 Site::Plant => run.plant_laws.push(law),
                 Site::Observation => run.observation_laws.push(law),
@@ -238,7 +242,8 @@ impl<P: Plant> Simulator for Assembly<P> {
 
     fn clock(&self) -> Clock {
         match (self.plant.clock(), self.step) {
-            (Clock::Sampled { .. }, Some(longest_step)) => Clock::Sampled { longest_step },
+            // A plant of no longest step is not integrated: it goes from row to row.
+            (Clock::Sampled { longest_step: own }, Some(longest_step)) if own.is_finite() => Clock::Sampled { longest_step },
             (clock, _) => clock,
         }
     }
@@ -327,7 +332,8 @@ impl<P: Plant> Assembly<P> {
     /// Rows are samples: the observation of a row is taken before its command acts.
     fn follow_samples(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
         // What is on its way when a run starts is not lost, whatever row it starts from.
-        let memory = self.parts.iter().map(|part| part.mechanism.memory()).fold(0.0, f64::max);
+        let shaping = self.parts.iter().filter(|part| part.mechanism.site(part.form) == Site::Command);
+        let memory = shaping.map(|part| part.mechanism.memory()).fold(0.0, f64::max);
         let since = recording.time[rows.start] - memory;
         let warm = recording.time[..rows.start].partition_point(|t| *t < since);
         for row in warm..rows.end {
@@ -338,13 +344,13 @@ impl<P: Plant> Assembly<P> {
             if row + 1 == rows.end {
                 break;
             }
-            let command = recording.stimulus.command(row);
             let interval = recording.time[row + 1] - time;
             let substeps = self.clock().substeps(interval);
             let step = interval / substeps as f64;
             for sub in 0..substeps {
                 let tick = Tick { index: row, time: time + sub as f64 * step, step };
-                run.send(tick, &command);
+                let share = (sub as f64 + 0.5) / substeps as f64;
+                run.send(tick, &recording.stimulus.command_within(row, share));
                 if row >= rows.start {
                     run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
                 }
@@ -374,7 +380,7 @@ struct Follow {
 impl Follow {
     fn new(channels: &[Channel], lanes: usize, rows: usize, every: Option<usize>) -> Self {
         let one: Trajectory =
-            channels.iter().map(|c| Simulated { channel: c.name.to_owned(), samples: Vec::with_capacity(rows) }).collect();
+            channels.iter().map(|c| Simulated { channel: c.name.to_string(), samples: Vec::with_capacity(rows) }).collect();
         // A clone of an empty vector has no capacity: reserve in each lane.
         let mut trajectories = vec![one; lanes];
         trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
@@ -406,8 +412,9 @@ impl<P: Plant> Twin for Assembly<P> {
             }
             for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {
                 let known = recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus));
-                if known && mechanism.followed(form_index) {
-                    candidates.push(Candidate { about, form, form_index });
+                if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
+                    let finishing = mechanism.finishing(form_index);
+                    candidates.push(Candidate { about, form, form_index, finishing });
                 }
             }
         }
@@ -427,6 +434,24 @@ impl<P: Plant> Twin for Assembly<P> {
 
     fn stepping(&self, seconds: f64) -> Self {
         Self { step: Some(seconds), ..self.clone() }
+    }
+
+    fn quiet(&self) -> Self {
+        Self { quiet: true, ..self.clone() }
+    }
+
+    fn recognized(&self, signs: &Signs) -> Vec<Candidate> {
+        let modelled = self.modelled();
+        let unknown = |about: &About| !modelled.contains(&about.name) && !self.excluded.iter().any(|id| id == about.name);
+        let mut found = Vec::new();
+        for mechanism in self.registry.iter().filter(|m| unknown(&m.about())) {
+            for (form_index, mut form) in mechanism.forms(&Default::default()).into_iter().enumerate() {
+                let Some(values) = mechanism.recognized(form_index, signs) else { continue };
+                form.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.nominal = value);
+                found.push(Candidate { about: mechanism.about(), form, form_index, finishing: false });
+            }
+        }
+        found
     }
 
     fn modelled(&self) -> Vec<&'static str> {

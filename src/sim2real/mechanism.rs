@@ -68,6 +68,15 @@ impl fmt::Display for Site {
     }
 }
 
+/// What a measured channel shows of its sensor, whatever simulator it is held against.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Signs {
+    /// The part of the samples that repeat the one before to the last bit, where none should.
+    pub repeated: f64,
+    /// Mean number of repeats in a row.
+    pub run: f64,
+}
+
 /// One way to state a mechanism: a law and the parameters it has.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Form {
@@ -109,6 +118,7 @@ pub struct About {
 /// # Contract
 /// - At the nominal values of its parameters it changes no bit of the output.
 /// - At each start it changes something, on a plant that is moved enough.
+/// - No two of its forms have parameters of the same names: a twin tells by them which form it means.
 /// - Its law acts at its site only, and a lane's result never depends on the lanes beside it.
 ///
 /// [`check_mechanism`](super::check_mechanism) runs it.
@@ -131,10 +141,19 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn followed(&self, _form: usize) -> bool {
         true
     }
+    /// Whether form `form` only rounds what is reported: tried as it is once everything else is fitted, for what jumps has
+    /// no gradient to follow.
+    fn finishing(&self, _form: usize) -> bool {
+        false
+    }
+    /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.
+    fn recognized(&self, _form: usize, _signs: &Signs) -> Option<Vec<f64>> {
+        None
+    }
     /// For how long what it did before matters to what it does [s]: a run that starts in the middle of a recording sees
     /// the commands of as long a time before.
     fn memory(&self) -> f64 {
-        2.0
+        1.0
     }
     /// The running part of form `form` over the lanes of `thetas`, which holds that form's parameters and no others.
     fn law(&self, form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<P>>;

@@ -34,9 +34,15 @@ impl Parameter {
     /// A parameter with a flat prior over all reals.
     #[must_use]
     pub fn new(name: &'static str, unit: &'static str, nominal: f64) -> Self {
+        Self::named(name, unit, nominal)
+    }
+
+    /// The same of a name and a unit that are not known when the program is compiled.
+    #[must_use]
+    pub fn named(name: impl Into<Cow<'static, str>>, unit: impl Into<Cow<'static, str>>, nominal: f64) -> Self {
         Self {
-            name: Cow::Borrowed(name),
-            unit: Cow::Borrowed(unit),
+            name: name.into(),
+            unit: unit.into(),
             nominal,
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,

@@ -350,3 +350,39 @@ fn mis_set(arm: Arm, far: bool, rng: &mut impl Rng) -> ([f64; 4], [f64; 4]) {
     }
     (nominal, uncertainty)
 }
+
+/// What is concealed in a case, without drawing it.
+#[cfg(test)]
+pub(super) fn names(seed: Seed, index: usize) -> Vec<&'static str> {
+    Plan::of(seed, index).ids
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The size in a label is what was asked for, and what a search by coarse steps found is there in fine ones.
+    #[test]
+    fn the_projected_size_hits_its_target() {
+        for (id, target) in [("stiffness", 3.0), ("coulomb_friction", 5.0), ("compliance", 2.0), ("command_delay", 8.0)] {
+            let plan = Plan { kind: Kind::Single, ids: vec![id] };
+            let mut hits = 0;
+            for attempt in 0..6 {
+                let set = Set::draw(&plan, Seed(attempt));
+                let Ok(dosed) = set.concealing(&plan, &[target]) else { continue };
+                let (noise, hideable) = (set.noise_of(0), set.hideable());
+                let size = set.sizes(&dosed, &noise, &hideable)[0];
+                assert!((size / target - 1.0).abs() < 0.06, "{id}: {size}");
+                let fine = |effects: &[Effect]| {
+                    let seed = set.seed.child(RECORDINGS[0]);
+                    let motion = Machine::new(set.arm, effects).run(&set.drives[0], Precision::Fine, seed);
+                    set.sensor(effects, 0).measure(&motion, &set.drives[0], &noise)
+                };
+                let fine = hideable.size(&fine(&set.effects(&dosed)), &fine(&[]), set.sigma());
+                assert!((fine / target - 1.0).abs() < 0.08, "{id}: {fine} in fine steps");
+                hits += 1;
+            }
+            assert!(hits > 0, "{id} was never to be had");
+        }
+    }
+}

@@ -82,3 +82,21 @@ pub(super) enum Foreign {
     /// A bent shaft: viscous friction that depends on where the arm is.
     BentShaft { friction: f64, phase: f64 },
 }
+
+impl Effect {
+    /// Whether it acts on what is seen of an arm alone, and not on its motion.
+    pub fn is_of_sensor(&self) -> bool {
+        matches!(
+            self,
+            Self::Offset { .. }
+                | Self::Creep { .. }
+                | Self::Stretch { .. }
+                | Self::Counts { .. }
+                | Self::Fold { .. }
+                | Self::Wobble { .. }
+                | Self::Bursts { .. }
+                | Self::Late { .. }
+                | Self::Foreign(Foreign::Clock { .. })
+        )
+    }
+}

@@ -168,8 +168,8 @@ impl Swing {
         if arm.adds_up() {
             return Self { usual: logarithmic(rng, 0.4, 3.0), most: f64::INFINITY };
         }
-        let usual = if spins { rng.random_range(1.3..2.5) } else { logarithmic(rng, 0.2, 0.95) };
-        Self { usual, most: if spins { f64::INFINITY } else { 2.5 } }
+        let usual = if spins { rng.random_range(1.3..2.5) } else { logarithmic(rng, 0.2, 0.9) };
+        Self { usual, most: if spins { f64::INFINITY } else { 2.1 } }
     }
 }
 
@@ -193,12 +193,15 @@ pub(super) fn driven(arm: Arm, wave: &[f64], sample: f64, start: f64, swing: Swi
         let count = rows.div_ceil(5) as f64;
         ((square / count - (sum / count).powi(2)).max(0.0).sqrt(), motion.reach())
     };
-    let stiffness = arm.gravity_torque.max(arm.viscous_friction);
-    let (mut low, mut high) = (1e-3 * stiffness / arm.gain, 100.0 * stiffness / arm.gain);
-    for _ in 0..9 {
-        let middle = (low * high).sqrt();
-        let (usual, most) = moved(middle);
-        if usual > swing.usual || most > swing.most { high = middle } else { low = middle }
+    // Nearly in proportion: a few steps come near enough, and one that goes too far is drawn back.
+    let mut size = 0.3 * arm.gravity_torque.max(arm.viscous_friction) / arm.gain;
+    for step in 0..12 {
+        let (usual, most) = moved(size);
+        let factor = (swing.usual / usual.max(1e-9)).min(swing.most / most.max(1e-9));
+        if factor > 0.95 && (factor < 1.05 || step >= 5) {
+            break;
+        }
+        size *= if step < 5 { factor.clamp(0.2, 5.0) } else { 0.85 };
     }
-    drive(low)
+    drive(size)
 }

@@ -23,3 +23,6 @@ pub use arm::Arm;
 pub use draw::{Case, draw};
 pub use kind::{Kind, MIX, Null};
 pub use label::{Concealed, Label, Span};
+
+#[cfg(test)]
+mod tests;

@@ -88,30 +88,20 @@ struct State {
     load: load::Memory,
 }
 
-impl State {
-    /// `self + step * rate`.
-    fn moved(mut self, step: f64, rate: &Self) -> Self {
-        self.position += step * rate.position;
-        self.velocity += step * rate.velocity;
-        self.motor_position += step * rate.motor_position;
-        self.motor_velocity += step * rate.motor_velocity;
-        self.driver.iter_mut().zip(&rate.driver).for_each(|(value, rate)| *value += step * rate);
-        self.load.iter_mut().zip(&rate.load).for_each(|(value, rate)| *value += step * rate);
-        self
-    }
-}
-
 /// An arm with what acts on it.
 #[derive(Debug, Clone)]
 pub(super) struct Machine {
     arm: Arm,
     driver: Driver,
     load: Load,
+    /// Whether anything acts: most runs are of arms alone, and many.
+    bare: bool,
 }
 
 impl Machine {
     pub fn new(arm: Arm, effects: &[Effect]) -> Self {
-        Self { arm, driver: Driver::of(effects), load: Load::of(effects) }
+        let acts = |effect: &Effect| !effect.is_of_sensor();
+        Self { arm, driver: Driver::of(effects), load: Load::of(effects), bare: !effects.iter().any(acts) }
     }
 
     pub fn driver(&self) -> &Driver {
@@ -171,14 +161,15 @@ impl Machine {
     /// Integrates over `duration` [s] under one command, in steps that what is stiff can bear.
     fn integrate(&self, mut state: State, command: f64, mut time: f64, duration: f64, precision: Precision) -> State {
         let mut left = duration;
-        let driver = self.driver.fastest();
+        let driver = if self.bare { 0.0 } else { self.driver.fastest() };
         let patience = if precision == Precision::Fine { 0.7 } else { 1.6 };
         while left > 1e-12 {
             if let Precision::Euler(_) = precision {
                 return self.euler(state, command, time, left);
             }
-            let fastest =
-                driver.max(self.load.fastest(self.arm.inertia, state.position, state.velocity, state.motor_velocity));
+            let rubbing = if self.load.coupling.is_some() { state.motor_velocity } else { state.velocity };
+            let load = || self.load.fastest(self.arm.inertia, state.position, state.velocity, rubbing);
+            let fastest = if self.bare { 0.0 } else { driver.max(load()) };
             let step = left.min(precision.step()).min(if fastest > 0.0 { patience / fastest } else { f64::INFINITY });
             let step = if left - step < 0.1 * step { left } else { step };
             state = self.runge_kutta(state, command, time, step);
@@ -190,21 +181,41 @@ impl Machine {
 
     fn runge_kutta(&self, state: State, command: f64, time: f64, step: f64) -> State {
         let k1 = self.rates(&state, command, time);
-        let k2 = self.rates(&state.moved(0.5 * step, &k1), command, time + 0.5 * step);
-        let k3 = self.rates(&state.moved(0.5 * step, &k2), command, time + 0.5 * step);
-        let k4 = self.rates(&state.moved(step, &k3), command, time + step);
-        state.moved(step / 6.0, &k1).moved(step / 3.0, &k2).moved(step / 3.0, &k3).moved(step / 6.0, &k4)
+        let k2 = self.rates(&self.moved(state, 0.5 * step, &k1), command, time + 0.5 * step);
+        let k3 = self.rates(&self.moved(state, 0.5 * step, &k2), command, time + 0.5 * step);
+        let k4 = self.rates(&self.moved(state, step, &k3), command, time + step);
+        let parts = [(step / 6.0, &k1), (step / 3.0, &k2), (step / 3.0, &k3), (step / 6.0, &k4)];
+        parts.into_iter().fold(state, |state, (step, rate)| self.moved(state, step, rate))
+    }
+
+    /// `state + step * rate`.
+    fn moved(&self, mut state: State, step: f64, rate: &State) -> State {
+        state.position += step * rate.position;
+        state.velocity += step * rate.velocity;
+        if !self.bare {
+            state.motor_position += step * rate.motor_position;
+            state.motor_velocity += step * rate.motor_velocity;
+            state.driver.iter_mut().zip(&rate.driver).for_each(|(value, rate)| *value += step * rate);
+            state.load.iter_mut().zip(&rate.load).for_each(|(value, rate)| *value += step * rate);
+        }
+        state
     }
 
     fn euler(&self, state: State, command: f64, time: f64, step: f64) -> State {
         let rates = self.rates(&state, command, time);
         let velocity = state.velocity + step * rates.velocity;
         let position = state.position + step * velocity;
-        State { position, velocity, motor_position: position, motor_velocity: velocity, ..state.moved(step, &rates) }
+        State { position, velocity, motor_position: position, motor_velocity: velocity, ..self.moved(state, step, &rates) }
     }
 
     /// Time derivatives of the state.
     fn rates(&self, state: &State, command: f64, time: f64) -> State {
+        if self.bare {
+            let Arm { inertia, viscous_friction, gravity_torque, gain, .. } = self.arm;
+            let weight = if gravity_torque == 0.0 { 0.0 } else { gravity_torque * state.position.sin() };
+            let velocity = (gain * command - viscous_friction * state.velocity - weight) / inertia;
+            return State { position: state.velocity, velocity, ..State::default() };
+        }
         let (output, driver) = self.driver.act(&state.driver, command, time);
         let (more_inertia, more_gravity) = self.load.mass(time);
         let gravity = (self.arm.gravity_torque + more_gravity) * self.load.gravity_factor(time);

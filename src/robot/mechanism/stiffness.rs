@@ -3,7 +3,8 @@
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
-/// `-rate q`.
+/// `-rate q`; in the form `bent`, `-bent_rate q - third_rate q^3`: no spring is quite straight, and one that bends is one
+/// spring, not two.
 ///
 /// Source: Hooke, *De potentia restitutiva* (1678).
 #[derive(Debug, Clone, Copy)]
@@ -15,7 +16,7 @@ impl<P: Mover> Mechanism<P> for Stiffness {
             name: "stiffness",
             site: Site::Plant,
             title: "a spring",
-            law: "inertia a = ... - rate q",
+            law: "inertia a = ... - rate q; bent: ... - bent_rate q - third_rate q^3",
             source: "Hooke, De potentia restitutiva (1678)",
             remedy: "look for a cable, hose or return spring; add its rate to the simulator",
             contains: &[],
@@ -24,13 +25,34 @@ impl<P: Mover> Mechanism<P> for Stiffness {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.05, 0.3].map(|fraction| fraction * typical.effort / typical.output.max(1e-12));
-        Form::only(vec![
-            Parameter::new("rate", "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts).proportional(),
-        ])
+        let rate =
+            |name| Parameter::new(name, "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts).proportional();
+        let thirds = [0.02, -0.02].map(|fraction| fraction * typical.effort / typical.output.powi(3).max(1e-12));
+        let third = Parameter::new("third_rate", "N m/rad^3", 0.0).starting_at(&thirds).proportional();
+        vec![
+            Form { name: "straight", parameters: vec![rate("rate")] },
+            Form { name: "bent", parameters: vec![rate("bent_rate"), third] },
+        ]
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Spring(thetas.row(0).to_vec()))
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let rates = thetas.row(0).to_vec();
+        if form == 0 { Box::new(Spring(rates)) } else { Box::new(BentSpring { rates, thirds: thetas.row(1).to_vec() }) }
+    }
+}
+
+struct BentSpring {
+    rates: Vec<f64>,
+    thirds: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for BentSpring {
+    fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let lanes = effects.iter_mut().zip(scene.states).zip(self.rates.iter().zip(&self.thirds));
+        for ((effect, state), (rate, third)) in lanes {
+            let position = P::motion(state).position;
+            P::push(effect).stiffness += rate + third * position * position;
+        }
     }
 }
 

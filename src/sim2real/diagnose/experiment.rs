@@ -13,7 +13,7 @@ use super::rivals::Place;
 use super::select::Selection;
 use super::words::figure;
 use super::{Effect, NextExperiment, Verdict};
-use crate::sim2real::identify::{Problem, State, fit_smooth};
+use crate::sim2real::identify::{Effort, Problem, State, fit_smooth};
 use crate::sim2real::{Part, Recording, Thetas, Twin};
 
 /// Name of the file with the commands.
@@ -135,7 +135,7 @@ fn contenders<T: Twin>(
     let fitted = kept.par_iter().filter_map(|(place, number)| {
         let less = selection.without.get(*place)?;
         let screened = inquiry.screened(less).into_iter().find(|s| s.number == *number)?;
-        Some((name(*number).to_owned(), inquiry.extended(less, *number, &screened)))
+        Some((name(*number).to_owned(), inquiry.extended(less, *number, &screened, Effort::Thorough)))
     });
     fitted.collect()
 }

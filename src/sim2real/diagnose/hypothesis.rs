@@ -3,7 +3,7 @@
 use super::evidence::Evidence;
 use super::screen::{Screened, signatures};
 use super::whiteness::{ChannelMisfit, channel_misfits};
-use crate::sim2real::identify::{Block, Fit, Problem, State, fit};
+use crate::sim2real::identify::{Block, Effort, Fit, Problem, State, fit};
 use crate::sim2real::{Candidate, Parameter, Part, Seed, Twin};
 
 /// The twin with the mechanisms numbered in `added`, and its fit.
@@ -48,17 +48,15 @@ impl<T: Twin> Inquiry<'_, T> {
     /// The twin as given, its own parameters refitted.
     pub fn recalibrated(&self) -> Hypothesis<T> {
         let start: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
-        self.fitted(self.twin.clone(), Vec::new(), &[start], None)
+        self.fitted(self.twin.clone(), Vec::new(), &[start], None, Effort::Thorough)
     }
 
     /// `parent` with candidate `number` added, fitted from the starts that screening liked best.
-    pub fn extended(&self, parent: &Hypothesis<T>, number: usize, screened: &Screened) -> Hypothesis<T> {
+    pub fn extended(&self, parent: &Hypothesis<T>, number: usize, screened: &Screened, effort: Effort) -> Hypothesis<T> {
         let twin = parent.twin.with(&self.candidates[number]);
-        let own = &self.candidates[number].form.parameters;
-        let starts: Vec<Vec<f64>> =
-            apart(&screened.starts, own).into_iter().map(|s| parent.fit.values.iter().chain(s).copied().collect()).collect();
+        let starts = apart(&screened.starts, twin.parameters());
         let added = parent.added.iter().copied().chain([number]).collect();
-        self.fitted(twin, added, &starts, Some(&parent.fit.state))
+        self.fitted(twin, added, &starts, Some(&parent.fit.state), effort)
     }
 
     /// `whole` without the `position`-th of its mechanisms, refitted from the joint solution and from the twin as given.
@@ -79,7 +77,20 @@ impl<T: Twin> Inquiry<'_, T> {
             }
             at += count;
         }
-        self.fitted(twin, added, &[joint, given], Some(&whole.fit.state))
+        self.fitted(twin, added, &[joint, given], Some(&whole.fit.state), Effort::Thorough)
+    }
+
+    /// `parent` with candidate `number` added at its nominal values, and nothing fitted anew.
+    pub fn as_it_is(&self, parent: &Hypothesis<T>, number: usize) -> Hypothesis<T> {
+        let twin = parent.twin.with(&self.candidates[number]);
+        let problem = self.problem(&twin, &self.evidence.compared);
+        let mut fit = parent.fit.clone();
+        fit.values.extend(self.candidates[number].form.parameters.iter().map(|p| p.nominal));
+        fit.std.resize(fit.values.len(), 0.0);
+        fit.residual = problem.evaluate(&fit.values, &fit.state, &[]).residual;
+        let blocks = problem.blocks();
+        let added = parent.added.iter().copied().chain([number]).collect();
+        self.weighed(twin, added, fit, &blocks)
     }
 
     /// `hypothesis` refitted with this inquiry's step of integration, from where it stands.
@@ -90,14 +101,22 @@ impl<T: Twin> Inquiry<'_, T> {
             hypothesis.added.clone(),
             std::slice::from_ref(&hypothesis.fit.values),
             Some(&hypothesis.fit.state),
+            Effort::Thorough,
         )
     }
 
     /// The best fit of `twin` from several starts.
-    fn fitted(&self, twin: T, added: Vec<usize>, starts: &[Vec<f64>], state: Option<&State>) -> Hypothesis<T> {
+    fn fitted(
+        &self,
+        twin: T,
+        added: Vec<usize>,
+        starts: &[Vec<f64>],
+        state: Option<&State>,
+        effort: Effort,
+    ) -> Hypothesis<T> {
         let problem = self.problem(&twin, &self.evidence.compared);
         let estimated = self.evidence.initial_state(&problem);
-        let best = fit(&problem, starts, &free_parameters(&twin), state.unwrap_or(&estimated));
+        let best = fit(&problem, starts, &free_parameters(&twin), state.unwrap_or(&estimated), effort);
         let blocks = problem.blocks();
         self.weighed(twin, added, best, &blocks)
     }
@@ -114,7 +133,7 @@ impl<T: Twin> Inquiry<'_, T> {
         }
         let problem = self.problem(&hypothesis.twin, &self.evidence.free_run);
         let start = std::slice::from_ref(&hypothesis.fit.values);
-        fit(&problem, start, &hypothesis.fit.free, &State::estimated(&problem))
+        fit(&problem, start, &hypothesis.fit.free, &State::estimated(&problem), Effort::Thorough)
     }
 
     /// The problem of fitting `twin` to `parts`.
@@ -134,17 +153,17 @@ pub(super) fn free_parameters<T: Twin>(twin: &T) -> Vec<usize> {
 }
 
 /// The first starts that differ from those before them by more than a fit makes up for in a step or two.
-fn apart<'a>(starts: &'a [Vec<f64>], parameters: &[Parameter]) -> Vec<&'a Vec<f64>> {
-    let mut kept: Vec<&Vec<f64>> = Vec::new();
+fn apart(starts: &[Vec<f64>], parameters: &[Parameter]) -> Vec<Vec<f64>> {
+    let mut kept: Vec<Vec<f64>> = Vec::new();
     for start in starts {
-        let near = |other: &&Vec<f64>| {
-            start.iter().zip(*other).zip(parameters).all(|((a, b), p)| {
+        let near = |other: &Vec<f64>| {
+            start.iter().zip(other).zip(parameters).all(|((a, b), p)| {
                 let size = (a - p.nominal).abs().max((b - p.nominal).abs());
                 (a - b).abs() <= 0.3 * if size.is_finite() { size } else { b.abs() }
             })
         };
         if kept.len() < STARTS && !kept.iter().any(near) {
-            kept.push(start);
+            kept.push(start.clone());
         }
     }
     kept

@@ -87,7 +87,7 @@ pub(super) fn located<T: Twin>(
 /// The unit of a covariate, where it is a channel's.
 pub(super) fn unit<T: Twin>(inquiry: &Inquiry<'_, T>, name: &str) -> String {
     let known = inquiry.twin.channels().iter().find(|c| c.name == name);
-    known.map(|c| inquiry.twin.unit(c.unit)).unwrap_or_default()
+    known.map(|c| inquiry.twin.unit(&c.unit)).unwrap_or_default()
 }
 
 /// The residuals of `hypothesis`, channel by channel and recording by recording.

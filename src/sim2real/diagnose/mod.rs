@@ -19,6 +19,7 @@ mod noise;
 mod onset;
 mod profile;
 mod prove;
+mod recognize;
 mod rivals;
 mod screen;
 mod select;
@@ -120,12 +121,45 @@ pub fn diagnose<T: Twin>(
     seed: Seed,
     progress: Progress<'_>,
 ) -> Outcome<T> {
+    let signs = recognize::signs(twin, recordings);
+    let found = Found { signs, of: twin.recognized(&signs) };
+    let quiet = twin.quiet();
+    if found.of.is_empty() {
+        return followed(&quiet, recordings, held_out, &found, seed, progress);
+    }
+    let channel = twin.channels().first().map(|c| c.name.clone()).unwrap_or_default();
+    let cleaned = [recordings, held_out].map(|all| recognize::without_repeats(all, &channel));
+    followed(&quiet, &cleaned[0], &cleaned[1], &found, seed, progress)
+}
+
+/// What the recordings show by themselves.
+pub(super) struct Found {
+    signs: super::Signs,
+    of: Vec<super::Candidate>,
+}
+
+/// The same of a twin that is followed, beside what was found without following it.
+fn followed<T: Twin>(
+    twin: &T,
+    recordings: &[Recording<T::Stimulus>],
+    held_out: &[Recording<T::Stimulus>],
+    found: &Found,
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Outcome<T> {
     progress("dividing the recordings", 0, 1);
     let evidence = Evidence::divide(twin, recordings, held_out);
-    let candidates = twin.candidates(recordings);
-    let inquiry = Inquiry { twin, candidates: &candidates, evidence: &evidence, seed };
-    let (mut selection, rivals) = selected(&inquiry, progress);
+    let candidates = recognize::fixed(twin.candidates(recordings));
+    // Where a plant adds up errors, a free run tells most if the physics is complete, and hardly anything if it is not.
+    let free_run = evidence.in_free_run();
+    let mut inquiry = Inquiry { twin, candidates: &candidates, evidence: &free_run, seed };
+    let (mut selection, mut rivals) = selected(&inquiry, progress);
+    if evidence.window.is_some() && !selection.complete() {
+        inquiry = Inquiry { evidence: &evidence, ..inquiry };
+        (selection, rivals) = selected(&inquiry, progress);
+    }
     selection.mark_accepted(&candidates);
+    let selection = recognize::finished(&inquiry, selection, &mut rivals);
     progress("proving on held-out data", 0, 1);
     let recalibrated = inquiry.in_free_run(&selection.recalibrated);
     let trued = inquiry.in_free_run(&selection.selected);
@@ -135,9 +169,9 @@ pub fn diagnose<T: Twin>(
         recalibrated: (twin, &recalibrated.values),
         trued: (&selection.selected.twin, &trued.values),
     };
-    let comparisons = prove::compared(&contest, &evidence, seed);
+    let comparisons = prove::compared(&contest, inquiry.evidence, seed);
     let findings = verdict::Findings {
-        fits: prove::channel_fits(&comparisons, &evidence.weights, seed),
+        fits: prove::channel_fits(&comparisons, &inquiry.evidence.weights, seed),
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
         remainder: verdict::remainder(&inquiry, &selection),
         dependence: verdict::dependence(&inquiry, &selection.selected),
@@ -146,6 +180,7 @@ pub fn diagnose<T: Twin>(
         trued: trued.clone(),
     };
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
+    verdict::recognized(&mut diagnosis, &inquiry, found);
     progress("saying where", 0, 1);
     let covariates = locate::covariates(&inquiry);
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
@@ -158,15 +193,13 @@ pub fn diagnose<T: Twin>(
         diagnosis.next_experiment = Some(next);
         excitation
     });
-    Outcome {
-        diagnosis,
-        trued: selection.selected.twin,
-        values: trued.values,
-        std: findings.std,
-        comparisons,
-        profiles,
-        excitation,
+    let (mut trued_twin, mut values, mut std) = (selection.selected.twin, trued.values, findings.std);
+    for candidate in &found.of {
+        trued_twin = trued_twin.with(candidate);
+        values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
+        std.resize(values.len(), 0.0);
     }
+    Outcome { diagnosis, trued: trued_twin, values, std, comparisons, profiles, excitation }
 }
 
 /// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.

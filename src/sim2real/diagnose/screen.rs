@@ -13,6 +13,9 @@ const LANES: usize = 48;
 /// same with and without the mechanism.
 const EXCITED: f64 = 3.0;
 
+/// A refit whose mean squared residual is this many times the noise may have been bent by what is missing.
+const BENT: f64 = 1.5;
+
 /// What screening found of one candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Screened {
@@ -25,25 +28,35 @@ pub(super) struct Screened {
     pub survival: f64,
     /// Whether its largest start would change what is measured by more than the noise.
     pub excited: bool,
-    /// Its starts, the most promising first, each one value a parameter.
+    /// Where to begin, the most promising first: values of all parameters, the twin's own and its own.
     pub starts: Vec<Vec<f64>>,
     /// Its projected signature at the best start, of length 1.
     pub signature: DVector<f64>,
 }
 
 /// Screens every candidate that `parent` does not have.
+///
+/// A refit that had to do without a mechanism has been bent by it, sometimes out of all likeness: the twin with its
+/// parameters as given is looked at too, where nothing has been added yet.
 pub(super) fn signatures<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>) -> Vec<Screened> {
-    let ground = Ground::new(inquiry, parent);
+    let mut grounds = vec![Ground::new(inquiry, parent, &parent.fit.values)];
+    if parent.added.is_empty() && parent.misfits.iter().any(|m| m.sum_of_squares > BENT * m.count as f64) {
+        let given: Vec<f64> = parent.twin.parameters().iter().map(|p| p.nominal).collect();
+        grounds.push(Ground::new(inquiry, parent, &given));
+    }
     let has: Vec<&str> = parent.added.iter().map(|n| inquiry.candidates[*n].about.name).collect();
     (0..inquiry.candidates.len())
         .into_par_iter()
+        .filter(|number| !inquiry.candidates[*number].finishing)
         .filter(|number| !has.contains(&inquiry.candidates[*number].about.name))
-        .filter_map(|number| screen(inquiry, parent, number, &ground))
+        .filter_map(|number| screen(inquiry, parent, number, &grounds))
         .collect()
 }
 
 /// What a signature is compared with: the parent's residual, and the directions its parameters can move it in.
 struct Ground {
+    /// Values of the parent's parameters.
+    values: Vec<f64>,
     /// What initial states explain, part by part.
     basis: Vec<DMatrix<f64>>,
     state: State,
@@ -56,31 +69,32 @@ struct Ground {
 
 impl Ground {
     /// Channels are brought to the same size first, so that a large misfit in one does not drown another.
-    fn new<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>) -> Self {
+    fn new<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, values: &[f64]) -> Self {
         let problem = inquiry.problem(&parent.twin, &inquiry.evidence.compared);
         let blocks = problem.blocks();
-        let rows = blocks.last().map_or(0, |b| b.range.end);
-        let basis = problem.evaluate(&parent.fit.values, &parent.fit.state, &[]).initial_basis;
-        let followed = problem
-            .residuals(std::slice::from_ref(&parent.fit.values), &parent.fit.state, &basis)
-            .pop()
-            .unwrap_or_else(|| DVector::zeros(rows));
-        let scale = scale(parent, &blocks, rows);
-        let mut jacobian = parent.fit.jacobian.rows(0, rows).into_owned();
+        let state = parent.fit.state.clone();
+        let evaluation = problem.evaluate(values, &state, &parent.fit.free);
+        let (rows, basis) = (evaluation.measured, evaluation.initial_basis);
+        let followed = problem.residuals(&[values.to_vec()], &state, &basis).pop();
+        let followed = followed.unwrap_or_else(|| DVector::zeros(rows));
+        let scale = scale(&followed, parent, &blocks);
+        let mut jacobian = evaluation.jacobian.rows(0, rows).into_owned();
         for mut column in jacobian.column_iter_mut() {
             column.component_mul_assign(&scale);
         }
         let hidden = orthonormal(jacobian);
         let residual = without(&followed.component_mul(&scale), &hidden);
-        Self { basis, state: parent.fit.state.clone(), followed, scale, hidden, residual }
+        Self { values: values.to_vec(), basis, state, followed, scale, hidden, residual }
     }
 }
 
-fn scale<T>(parent: &Hypothesis<T>, blocks: &[Block], rows: usize) -> DVector<f64> {
-    let mut scale = DVector::from_element(rows, 0.0);
+fn scale<T>(residual: &DVector<f64>, parent: &Hypothesis<T>, blocks: &[Block]) -> DVector<f64> {
+    let mut scale = DVector::from_element(residual.len(), 0.0);
     for misfit in &parent.misfits {
-        let size = (misfit.sum_of_squares / misfit.count.max(1) as f64).sqrt();
-        for block in blocks.iter().filter(|b| b.channel == misfit.channel) {
+        let own: Vec<&Block> = blocks.iter().filter(|b| b.channel == misfit.channel).collect();
+        let squares: f64 = own.iter().map(|b| residual.rows(b.range.start, b.range.len()).norm_squared()).sum();
+        let size = (squares / misfit.count.max(1) as f64).sqrt();
+        for block in own {
             scale.rows_mut(block.range.start, block.range.len()).fill(if size > 0.0 { 1.0 / size } else { 0.0 });
         }
     }
@@ -124,34 +138,42 @@ struct Tried {
     length: f64,
 }
 
-fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usize, ground: &Ground) -> Option<Screened> {
+fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usize, grounds: &[Ground]) -> Option<Screened> {
     let candidate = &inquiry.candidates[number];
     let trials = trials(candidate);
     let twin = parent.twin.with(candidate);
     let problem = inquiry.problem(&twin, &inquiry.evidence.compared);
-    let mut tried: Vec<Tried> = Vec::new();
+    let mut best: Option<Screened> = None;
     let mut loudest = 0.0_f64;
-    for batch in trials.chunks((LANES / trials[0].len().max(1)).max(1)) {
-        let thetas: Vec<Vec<f64>> =
-            batch.iter().flatten().map(|point| parent.fit.values.iter().chain(point).copied().collect()).collect();
-        let followed = problem.residuals(&thetas, &ground.state, &ground.basis);
-        let mut followed = followed.into_iter();
-        for points in batch {
-            let signatures: Vec<DVector<f64>> =
-                followed.by_ref().take(points.len()).map(|residual| &ground.followed - residual).collect();
-            loudest = signatures.iter().map(|s| s.norm()).filter(|n| n.is_finite()).fold(loudest, f64::max);
-            tried.extend(explained(candidate, points, &signatures, ground));
+    let mut starts: Vec<(f64, Vec<f64>)> = Vec::new();
+    for ground in grounds {
+        let mut tried: Vec<Tried> = Vec::new();
+        for batch in trials.chunks((LANES / trials[0].len().max(1)).max(1)) {
+            let thetas: Vec<Vec<f64>> =
+                batch.iter().flatten().map(|point| ground.values.iter().chain(point).copied().collect()).collect();
+            let mut followed = problem.residuals(&thetas, &ground.state, &ground.basis).into_iter();
+            for points in batch {
+                let signatures: Vec<DVector<f64>> =
+                    followed.by_ref().take(points.len()).map(|residual| &ground.followed - residual).collect();
+                loudest = signatures.iter().map(|s| s.norm()).filter(|n| n.is_finite()).fold(loudest, f64::max);
+                tried.extend(explained(candidate, points, &signatures, ground));
+            }
+        }
+        tried.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let whole = |start: &[f64]| -> Vec<f64> { ground.values.iter().chain(start).copied().collect() };
+        if let Some(one) = tried.first().filter(|one| best.as_ref().is_none_or(|b| one.score > b.score)) {
+            let (score, survival, signature) = (one.score.max(0.0), one.survival, one.signature.clone());
+            best = Some(Screened { number, score, survival, excited: true, starts: Vec::new(), signature });
+        }
+        for one in &tried {
+            starts.extend(scaled(candidate, one, ground).map(|start| (one.score, whole(&start))));
+            starts.push((one.score, whole(&one.start)));
         }
     }
-    tried.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let best = tried.first()?;
-    let (score, survival, signature) = (best.score.max(0.0), best.survival, best.signature.clone());
-    let mut starts: Vec<Vec<f64>> = Vec::new();
-    for one in tried {
-        starts.extend(scaled(candidate, &one, ground));
-        starts.push(one.start);
-    }
-    Some(Screened { number, score, survival, excited: loudest > EXCITED, starts, signature })
+    // Stable: of equal scores the refitted twin's come first.
+    starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let starts = starts.into_iter().map(|(_, start)| start).collect();
+    best.map(|best| Screened { excited: loudest > EXCITED, starts, ..best })
 }
 
 /// The points to follow: each entry holds one point, or, for a law with parameters it is proportional to, one point for

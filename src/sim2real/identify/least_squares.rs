@@ -5,6 +5,7 @@
 //! cannot know of.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::problem::{DIFFERENCE, Evaluation, Problem, State};
 use crate::sim2real::Simulator;
@@ -15,9 +16,7 @@ const RANK_TOLERANCE: f64 = 3.0 * DIFFERENCE;
 
 /// A fit ends when a step lowers the objective by less than this part of it: a thousandth of what the weakest evidence
 /// that counts is worth.
-const CONVERGED: f64 = 1e-6;
-/// Steps at the most.
-const STEPS: usize = 40;
+const CONVERGED: f64 = 1e-5;
 /// Damping of a first step, relative to the curvature (Marquardt, SIAM Journal 11 (1963)).
 const DAMPING: f64 = 1e-2;
 /// Dampings tried side by side at every step, relative to the last one that did best.
@@ -63,35 +62,65 @@ impl Fit {
 #[must_use]
 pub fn fit_smooth<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize], state: &State) -> Fit {
     let mut descent = Descent::new(problem, start, free, state);
-    descent.run(STEPS);
+    descent.run(Effort::Thorough.steps());
     descent.fit()
+}
+
+/// How far a fit goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// As far as it takes to see which of several hypotheses lead somewhere.
+    Brief,
+    /// To its end.
+    Thorough,
+}
+
+impl Effort {
+    fn steps(self) -> usize {
+        match self {
+            Self::Brief => 3,
+            Self::Thorough => 40,
+        }
+    }
 }
 
 /// Fits from the best of several starts: all make a few steps, and the one that is then lowest goes on to the end, with
 /// any that comes near it.
 #[must_use]
-pub fn fit_from<S: Simulator>(problem: &Problem<'_, S>, starts: &[Vec<f64>], free: &[usize], state: &State) -> Fit {
-    use rayon::prelude::*;
-    /// Steps that tell which starts lead somewhere.
-    const PROBE: usize = 4;
-    /// A start that stands at most this much higher than the best is followed too.
-    const NEAR: f64 = 1.1;
+pub fn fit_from<S: Simulator>(
+    problem: &Problem<'_, S>,
+    starts: &[Vec<f64>],
+    free: &[usize],
+    state: &State,
+    effort: Effort,
+) -> Fit {
+    let steps = effort.steps();
     let mut descents: Vec<Descent<'_, '_, S>> = starts
         .par_iter()
         .map(|start| {
             let mut descent = Descent::new(problem, start, free, state);
-            descent.run(if starts.len() > 1 { PROBE } else { STEPS });
+            descent.run(if starts.len() > 1 { PROBE } else { steps });
             descent
         })
         .collect();
     let lowest = descents.iter().map(|d| d.objective).fold(f64::INFINITY, f64::min);
-    descents.retain(|d| d.objective <= NEAR * lowest);
-    descents.par_iter_mut().for_each(|d| d.run(STEPS));
+    match effort {
+        Effort::Brief => descents.retain(|d| d.objective <= lowest),
+        Effort::Thorough => descents.retain(|d| d.objective <= NEAR * lowest),
+    }
+    if starts.len() > 1 {
+        descents.par_iter_mut().for_each(|d| d.run(steps));
+    }
     match descents.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective)) {
         Some(best) => best.fit(),
         None => fit_smooth(problem, &problem.nominal(), free, state),
     }
 }
+
+/// Steps that tell which starts lead somewhere.
+const PROBE: usize = 3;
+/// A start that stands at most this much higher than the best is followed too.
+const NEAR: f64 = 1.05;
 
 /// A fit under way.
 struct Descent<'a, 'b, S: Simulator> {

@@ -8,5 +8,5 @@ mod least_squares;
 mod problem;
 
 pub use derivative_free::{fit, minimize};
-pub use least_squares::{Fit, fit_from, fit_smooth};
+pub use least_squares::{Effort, Fit, fit_from, fit_smooth};
 pub use problem::{Block, Evaluation, Problem, State};

@@ -24,7 +24,7 @@ where
             law: "y -> y + rate t; settling: y -> y + offset (1 - exp(-t / time_constant))",
             source: "instrumental drift, JCGM 200:2012, International Vocabulary of Metrology, 4.21",
             remedy: "let the sensor warm up, or home the axis again from time to time; subtract the drift",
-            contains: &[],
+            contains: &["bias"],
         }
     }
 
@@ -35,10 +35,16 @@ where
         let times = [0.05, 0.3].map(|part| part * duration);
         let time = Parameter::new("time_constant", "s", f64::INFINITY).within(0.0, f64::INFINITY);
         vec![
-            Form { name: "linear", parameters: vec![Parameter::new("rate", "output/s", 0.0).starting_at(&rates)] },
+            Form {
+                name: "linear",
+                parameters: vec![Parameter::new("rate", "output/s", 0.0).starting_at(&rates).proportional()],
+            },
             Form {
                 name: "settling",
-                parameters: vec![Parameter::new("offset", "output", 0.0).starting_at(&offsets), time.starting_at(&times)],
+                parameters: vec![
+                    Parameter::new("offset", "output", 0.0).starting_at(&offsets).proportional(),
+                    time.starting_at(&times),
+                ],
             },
         ]
     }

@@ -32,7 +32,8 @@ where
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         // What matters is in proportion to the motion, and no disc in use is off by more than some hundredths of a turn.
         let start = (0.03 * typical.output).min(0.02);
-        let wave = |name, starts: &[f64]| Parameter::new(name, "output", 0.0).within(-0.5, 0.5).starting_at(starts);
+        let wave =
+            |name, starts: &[f64]| Parameter::new(name, "output", 0.0).within(-0.5, 0.5).starting_at(starts).proportional();
         let first = vec![wave("sine", &[start, -start]), wave("cosine", &[start, -start])];
         // A fit finds the sign of what is linear: the second pair needs a slope to begin with, not both signs.
         let second = [wave("second_sine", &[0.3 * start]), wave("second_cosine", &[0.3 * start])];

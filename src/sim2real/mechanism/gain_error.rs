@@ -30,7 +30,7 @@ where
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
         // An actuator that gives nothing at all, or has its sign wrong, is no matter of a gain that is a little off.
-        let error = |name| Parameter::new(name, "", 0.0).within(-0.95, 5.0).starting_at(&[0.15, -0.15]);
+        let error = |name| Parameter::new(name, "", 0.0).within(-0.95, 5.0).starting_at(&[0.15, -0.15]).proportional();
         vec![
             Form { name: "both", parameters: vec![error("error")] },
             Form { name: "asymmetric", parameters: vec![error("negative_error")] },

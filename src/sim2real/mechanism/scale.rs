@@ -26,7 +26,7 @@ where
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
         // A factor that turns the sign or hides the motion altogether is another fault than this.
-        Form::only(vec![Parameter::new("error", "", 0.0).within(-0.95, 10.0).starting_at(&[0.05, -0.05])])
+        Form::only(vec![Parameter::new("error", "", 0.0).within(-0.95, 10.0).starting_at(&[0.05, -0.05]).proportional()])
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

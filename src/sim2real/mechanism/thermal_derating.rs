@@ -4,7 +4,8 @@ use super::decay::Decay;
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `dh/dt = strength u^2 - h / time_constant`, `u -> max(0, 1 - h) u`: magnets weaken with the heat that currents leave in the
-/// windings. In the form `reciprocal`, `u -> u / (1 + h)`: copper's resistance grows, and a voltage drives less current.
+/// windings. In the form `reciprocal`, with `reciprocal_strength`, `u -> u / (1 + h)`: copper's resistance grows, and a voltage
+/// drives less current.
 ///
 /// `h` is the part of the gain that is lost (to first order, in the second form): a pure number, 0 at the recording's first
 /// row, where the actuator is taken to be at the temperature its gain is known for. `strength` [1/(command^2 s)] is how
@@ -40,15 +41,13 @@ where
         let heat = typical.command * typical.command * duration;
         let strengths = [0.5, 2.0].map(|lost| if heat > 0.0 { lost / heat } else { lost });
         let times = [0.15, 0.6].map(|part| part * duration);
-        ["linear", "reciprocal"]
-            .map(|name| {
-                let strength = Parameter::new("strength", "1/(command^2 s)", 0.0).within(0.0, f64::INFINITY);
-                // The shortest that a winding has; below, the gain would fall within a swing.
-                let time = Parameter::new("time_constant", "s", f64::INFINITY).within(0.1, f64::INFINITY);
-                let parameters = vec![strength.starting_at(&strengths), time.starting_at(&times)];
-                Form { name, parameters }
-            })
-            .to_vec()
+        // The shortest that a winding has; below, the gain would fall within a swing.
+        let time = Parameter::new("time_constant", "s", f64::INFINITY).within(0.1, f64::INFINITY).starting_at(&times);
+        let form = |name, strength| {
+            let strength = Parameter::new(strength, "1/(command^2 s)", 0.0).within(0.0, f64::INFINITY);
+            Form { name, parameters: vec![strength.starting_at(&strengths), time.clone()] }
+        };
+        vec![form("linear", "strength"), form("reciprocal", "reciprocal_strength")]
     }
 
     /// An actuator that has warmed stays warm: a run from anywhere needs all commands before.

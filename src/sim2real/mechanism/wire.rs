@@ -71,8 +71,9 @@ impl Plant for Wire {
         Clock::Sampled { longest_step: 1e-3 }
     }
 
-    fn channels(&self) -> &'static [Channel] {
-        &[Channel { name: "signal", unit: "rad" }, Channel { name: "rate", unit: "rad/s" }]
+    fn channels(&self) -> &[Channel] {
+        static CHANNELS: &[Channel] = &[Channel::new("signal", "rad"), Channel::new("rate", "rad/s")];
+        CHANNELS
     }
 
     fn parameters(&self) -> Vec<Parameter> {

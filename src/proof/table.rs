@@ -1,0 +1,312 @@
+//! The table of figures.
+
+use super::figure::{Figure, Goal, Unit};
+use super::reliability::Reliability;
+use super::score::{Answer, CLEAR, Entry, Method, WEAK};
+use super::trial::{Fitted, Trial};
+use super::wilson::Z;
+use crate::conceal::benchmark::{Concealed, Kind, Span};
+
+/// All figures, in the order in which they are shown.
+pub(super) fn figures(entries: &[Entry], reliability: &Reliability) -> Vec<Figure> {
+    let mut all = wanted_shares(entries);
+    all.extend(located(entries));
+    all.extend(parameters(entries));
+    all.extend(proven(entries));
+    let ece = Figure::number("calibration error", reliability.error, reliability.of);
+    let ece =
+        ece.meaning("mean distance of the confidence of a name and how often names of such confidence are right (ECE)");
+    all.push(ece.wanting(Goal::new(0.10, 0.03)));
+    let seconds = Figure::quantile("time of a diagnosis", Unit::Seconds, 0.5, entries.iter().map(|e| e.trial.seconds));
+    all.push(seconds.meaning("median, with as many under way at once as there are threads").wanting(Goal::new(30.0, 2.0)));
+    all.extend(further(entries));
+    all
+}
+
+/// Shares that something is wanted of.
+fn wanted_shares(entries: &[Entry]) -> Vec<Figure> {
+    let share = |name: &str, meaning: &str, of: &dyn Fn(&Entry) -> bool, holds: Holds<'_>, least: f64, aim: f64| {
+        let beside = |method: Method| {
+            let own = entries.iter().filter(|entry| of(entry)).map(|entry| holds(entry, &entry.answer(method)));
+            Figure::share("", own).value
+        };
+        let (recalibration, regression) = (beside(Method::Recalibration), beside(Method::Regression));
+        let figure = plain(entries, name, meaning, of, holds).wanting(Goal::new(least, aim));
+        Figure { recalibration, regression, ..figure }
+    };
+    let null =
+        |adversarial: bool| move |e: &Entry| matches!(e.label.kind, Kind::Null(null) if null.adversarial() == adversarial);
+    let named = |_: &Entry, answer: &Answer| !answer.names.is_empty();
+    vec![
+        share(
+            "right first",
+            "one effect of 1 sigma or more: the name most certain is the right one, and nothing else is said to be missing",
+            &clear,
+            &Entry::right_first,
+            0.85,
+            0.95,
+        ),
+        share(
+            "right among two",
+            "the same effects: the right name is among the first two, or listed as a rival",
+            &clear,
+            &Entry::right_or_rival,
+            0.93,
+            0.99,
+        ),
+        share(
+            "weak, right first",
+            "one effect of 0.3 to 1 sigma",
+            &|e| e.single(WEAK, CLEAR),
+            &Entry::right_first,
+            0.60,
+            0.80,
+        ),
+        share(
+            "pairs exact",
+            "two effects, both of 1 sigma or more: these two and no other",
+            &Entry::clear_pair,
+            &Entry::exact,
+            0.65,
+            0.85,
+        ),
+        share(
+            "false name, white",
+            "something named where nothing is missing: white noise, or parameters that are off alone",
+            &null(false),
+            &named,
+            0.05,
+            0.01,
+        ),
+        share(
+            "false name, misled",
+            "something named where nothing is missing: coloured noise, rounding, a coarse integrator",
+            &null(true),
+            &named,
+            0.10,
+            0.03,
+        ),
+        share(
+            "outside, said so",
+            "an effect that no registry has: unexplained; below 1 sigma it may also go unseen",
+            &|e| e.label.kind == Kind::Outside,
+            &Entry::said_so,
+            0.75,
+            0.95,
+        ),
+    ]
+}
+
+/// Whether an answer to a case is what is counted.
+type Holds<'a> = &'a dyn Fn(&Entry, &Answer) -> bool;
+
+fn clear(entry: &Entry) -> bool {
+    entry.single(CLEAR, f64::INFINITY)
+}
+
+/// A share of the cases `of` some kind, of which nothing is wanted.
+fn plain(entries: &[Entry], name: &str, meaning: &str, of: &dyn Fn(&Entry) -> bool, holds: Holds<'_>) -> Figure {
+    let own = entries.iter().filter(|entry| of(entry));
+    Figure::share(name, own.map(|entry| holds(entry, &entry.answer(Method::Diagnosis)))).meaning(meaning)
+}
+
+/// Shares that tell more, though nothing is wanted of them.
+fn further(entries: &[Entry]) -> [Figure; 5] {
+    let partly =
+        |entry: &Entry, answer: &Answer| !answer.names.is_empty() && answer.names.iter().all(|name| entry.conceals(name));
+    let silent = |_: &Entry, answer: &Answer| answer.names.is_empty() && !answer.unknown;
+    let null = |entry: &Entry| matches!(entry.label.kind, Kind::Null(_));
+    [
+        plain(entries, "that name alone", "one effect of 1 sigma or more: its name and no other", &clear, &Entry::exact),
+        plain(entries, "all pairs exact", "two effects of any size", &|e| e.label.kind == Kind::Pair, &Entry::exact),
+        plain(
+            entries,
+            "pairs, none wrong",
+            "both of 1 sigma or more: at least one right, none wrong",
+            &Entry::clear_pair,
+            &partly,
+        ),
+        plain(
+            entries,
+            "unreached, silent",
+            "an effect that is not reached: nothing named",
+            &|e| e.label.kind == Kind::NotExcited,
+            &silent,
+        ),
+        plain(entries, "false alarm", "called unexplained where nothing is missing", &null, &|_, answer| answer.unknown),
+    ]
+}
+
+/// Where and when: of single effects that act at times only.
+fn located(entries: &[Entry]) -> [Figure; 2] {
+    let effects: Vec<(&Entry, &Concealed)> = entries.iter().filter(|e| clear(e)).map(|e| (e, &e.label.effects[0])).collect();
+    let overlaps = effects.iter().filter(|(_, effect)| !effect.active.is_empty());
+    let overlaps = overlaps.map(|(entry, effect)| overlap(&effect.active, &entry.trial.intervals));
+    let times = effects.iter().filter_map(|(entry, effect)| {
+        let said = event_time(&entry.trial, &effect.id);
+        Some(said.map_or(f64::INFINITY, |said| (said - effect.onset.unwrap_or(said)).abs()))
+            .filter(|_| effect.onset.is_some())
+    });
+    let overlaps = Figure::quantile("intervals, IoU", Unit::Number, 0.5, overlaps);
+    let times = Figure::quantile("event time off by", Unit::Seconds, 0.5, times);
+    [
+        overlaps.meaning("median overlap of when an effect acted and when it is said to have").wanting(Goal::new(0.6, 0.85)),
+        times.meaning("median; an event that is not dated counts as infinitely far off").wanting(Goal::new(0.3, 0.1)),
+    ]
+}
+
+/// The time of an event as a diagnosis has it: the onset it gives, else the time that its mechanism has as a parameter.
+fn event_time(trial: &Trial, id: &str) -> Option<f64> {
+    let named = trial.found.iter().find(|found| found.mechanism == id);
+    let fitted = named.and_then(|found| found.parameters.get("time")).map(|time| time.value);
+    trial.onset.or(fitted)
+}
+
+/// Length of what two sets of stretches share over the length of what either has.
+fn overlap(one: &[Span], other: &[Span]) -> f64 {
+    let mut edges: Vec<(f64, usize, i32)> = Vec::new();
+    for (k, spans) in [one, other].into_iter().enumerate() {
+        spans.iter().for_each(|span| edges.extend([(span.start, k, 1), (span.end, k, -1)]));
+    }
+    edges.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut depth, mut last) = ([0, 0], f64::NEG_INFINITY);
+    let (mut both, mut either) = (0.0, 0.0);
+    for (time, k, step) in edges {
+        let length = time - last;
+        if depth.iter().any(|depth| *depth > 0) {
+            either += length;
+        }
+        if depth.iter().all(|depth| *depth > 0) {
+            both += length;
+        }
+        depth[k] += step;
+        last = time;
+    }
+    if either > 0.0 { both / either } else { 0.0 }
+}
+
+/// A fitted parameter beside the true one.
+struct Pair {
+    fitted: Fitted,
+    truth: f64,
+}
+
+impl Pair {
+    fn error(&self) -> f64 {
+        ((self.fitted.value - self.truth) / self.truth).abs()
+    }
+
+    fn covered(&self) -> bool {
+        self.fitted.std.is_some_and(|std| (self.fitted.value - self.truth).abs() <= Z * std)
+    }
+}
+
+/// Parameters of what was rightly named, and those the oracle found.
+fn parameters(entries: &[Entry]) -> [Figure; 2] {
+    let mut own = Vec::new();
+    let mut told = Vec::new();
+    for entry in entries.iter().filter(|entry| matches!(entry.label.kind, Kind::Single | Kind::Pair)) {
+        let answer = entry.answer(Method::Diagnosis);
+        for (place, effect) in entry.label.effects.iter().enumerate() {
+            if let Some(found) =
+                entry.trial.found.iter().find(|f| f.mechanism == effect.id && answer.names.contains(&f.mechanism))
+            {
+                own.extend(pairs(effect, |name| found.parameters.get(name).copied()));
+            }
+            if let Some(oracle) = &entry.trial.oracle {
+                told.extend(pairs(effect, |name| oracle.parameters.get(place)?.get(name).copied()));
+            }
+        }
+    }
+    let error =
+        |pairs: &[Pair]| Figure::quantile("parameters off by, median", Unit::Share, 0.5, pairs.iter().map(Pair::error));
+    let covered = |pairs: &[Pair]| Figure::share("95 % intervals of parameters hold", pairs.iter().map(Pair::covered));
+    let coverage = Goal { until: Some(0.97), ..Goal::new(0.85, 0.93) };
+    [
+        Figure { oracle: error(&told).value, ..error(&own).wanting(Goal::new(0.10, 0.03)) },
+        Figure { oracle: covered(&told).value, ..covered(&own).wanting(coverage) },
+    ]
+}
+
+/// The parameters of an effect that can be compared. Forms of a mechanism have names of their own for the same thing.
+fn pairs(effect: &Concealed, fitted: impl Fn(&str) -> Option<Fitted>) -> Vec<Pair> {
+    let comparable = effect.parameters.iter().filter(|(name, truth)| name.as_str() != "time" && **truth != 0.0);
+    let pair = |(name, truth): (&String, &f64)| {
+        let alias = if name == "time_constant" { "total_time".to_owned() } else { format!("soft_{name}") };
+        Some(Pair { fitted: fitted(name).or_else(|| fitted(&alias))?, truth: *truth })
+    };
+    comparable.filter_map(pair).collect()
+}
+
+/// Held-out errors over the oracle's, of cases with one or two effects.
+fn proven(entries: &[Entry]) -> [Figure; 2] {
+    let told: Vec<(&Trial, f64)> = entries
+        .iter()
+        .filter(|entry| matches!(entry.label.kind, Kind::Single | Kind::Pair))
+        .filter_map(|entry| Some((&entry.trial, entry.trial.oracle.as_ref()?.held_out)))
+        .filter(|(_, oracle)| *oracle > 0.0)
+        .collect();
+    let figure = |name: &str, meaning: &str, part: f64, least: f64, aim: f64| {
+        let ratios = |of: fn(&Trial) -> f64| told.iter().map(move |(trial, oracle)| of(trial) / oracle);
+        let own = Figure::quantile(name, Unit::Number, part, ratios(|trial| trial.held_out.trued));
+        let recalibrated = Figure::quantile(name, Unit::Number, part, ratios(|trial| trial.held_out.recalibrated));
+        let oracle = (!told.is_empty()).then_some(1.0);
+        Figure { recalibration: recalibrated.value, oracle, ..own.meaning(meaning).wanting(Goal::new(least, aim)) }
+    };
+    [
+        figure("error over oracle", "held-out error over that of a fit that was told the names, median", 0.5, 1.10, 1.02),
+        figure("the same, p95", "its 95th percentile", 0.95, 1.5, 1.10),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::score::tests::entry;
+    use super::*;
+    use crate::conceal::benchmark::Null;
+    use crate::proof::oracle::OracleFit;
+    use crate::sim2real::diagnose::Verdict;
+
+    #[test]
+    fn overlaps_are_of_lengths() {
+        let span = |start, end| Span { start, end };
+        assert_eq!(overlap(&[span(1.0, 3.0)], &[span(2.0, 5.0)]), 0.25);
+        assert_eq!(overlap(&[span(0.0, 1.0), span(2.0, 3.0)], &[span(0.0, 1.0), span(2.0, 3.0)]), 1.0);
+        assert_eq!(overlap(&[span(0.0, 1.0)], &[]), 0.0);
+    }
+
+    #[test]
+    fn figures_of_hand_made_outcomes() {
+        let mut right = entry(Kind::Single, &[("bias", 5.0)], Verdict::Named, &[("bias", 0.9)]);
+        right.label.effects[0].parameters.insert("offset".into(), 2.0);
+        right.trial.found[0].parameters.insert("offset".into(), Fitted { value: 2.1, std: Some(0.06) });
+        right.trial.oracle = Some(OracleFit { held_out: 0.0008, parameters: Vec::new() });
+        right.trial.regression = vec!["drift".to_owned()];
+        let mut late = entry(Kind::Single, &[("payload_change", 5.0)], Verdict::Named, &[("payload_change", 0.9)]);
+        late.label.effects[0].onset = Some(10.0);
+        late.label.effects[0].active = vec![Span { start: 10.0, end: 20.0 }];
+        late.trial.intervals = vec![Span { start: 10.0, end: 15.0 }];
+        late.trial.found[0].parameters.insert("time".into(), Fitted { value: 10.2, std: None });
+        let entries = [
+            right,
+            late,
+            entry(Kind::Single, &[("bias", 0.5)], Verdict::NoMismatch, &[]),
+            entry(Kind::Null(Null::White), &[], Verdict::Named, &[("bias", 0.9)]),
+            entry(Kind::Null(Null::Coarse), &[], Verdict::NoMismatch, &[]),
+            entry(Kind::Outside, &[("shaking", 9.0)], Verdict::Unexplained, &[]),
+        ];
+        let figures = figures(&entries, &Reliability::of(&entries));
+        let value = |name: &str| figures.iter().find(|f| f.name.starts_with(name)).unwrap().value;
+        assert_eq!(value("right first"), Some(1.0));
+        assert_eq!(value("weak, right first"), Some(0.0));
+        assert_eq!(value("pairs exact"), None);
+        assert_eq!((value("false name, white"), value("false name, misled")), (Some(1.0), Some(0.0)));
+        assert_eq!(value("outside"), Some(1.0));
+        assert_eq!(value("intervals, IoU"), Some(0.5));
+        assert!((value("event time").unwrap() - 0.2).abs() < 1e-9);
+        assert!((value("parameters off by").unwrap() - 0.05).abs() < 1e-9);
+        assert_eq!(value("intervals hold"), Some(1.0));
+        assert!((value("error over oracle").unwrap() - 1.25).abs() < 1e-9);
+        assert_eq!(figures[0].regression, Some(0.0));
+    }
+}

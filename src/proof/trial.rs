@@ -1,0 +1,119 @@
+//! A case diagnosed, and what is kept of it.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::case::{recordings, twin};
+use super::oracle::{OracleFit, oracle};
+use super::regression::regression;
+use crate::conceal::benchmark::{Case, Span};
+use crate::sim2real::Seed;
+use crate::sim2real::diagnose::{Diagnosis, Effect, Estimate, Verdict, diagnose};
+
+/// What was said of a case, and what the baselines said.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trial {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// What was named, most certain first.
+    pub found: Vec<Found>,
+    /// When it began [s], if the diagnosis says so.
+    pub onset: Option<f64>,
+    /// Where, in the recording to learn from.
+    pub intervals: Vec<Span>,
+    /// Root mean square errors on the recording to test on [rad].
+    pub held_out: HeldOut,
+    /// The fit that was told the names; none where the registry lacks one of them.
+    pub oracle: Option<OracleFit>,
+    /// The names that sparse regression on differentiated positions gives.
+    pub regression: Vec<String>,
+    /// How long the diagnosis took [s], other cases under way beside it.
+    pub seconds: f64,
+}
+
+/// A mechanism that was named.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// Its id.
+    pub mechanism: String,
+    /// Probability that the name is right.
+    pub confidence: f64,
+    /// What else it might be.
+    pub rivals: Vec<String>,
+    /// Its parameters.
+    pub parameters: BTreeMap<String, Fitted>,
+}
+
+/// A fitted value and its standard deviation, which is none where it is infinite.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Fitted {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: Option<f64>,
+}
+
+/// Errors of the three twins.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// As given.
+    pub nominal: f64,
+    /// Its own parameters refitted.
+    pub recalibrated: f64,
+    /// With what was named.
+    pub trued: f64,
+}
+
+/// Diagnoses a case without a look at its label; the oracle alone is told, and only then. `clock` gives a time [s].
+#[must_use]
+pub fn tried(case: &Case, clock: &(dyn Fn() -> f64 + Sync)) -> Trial {
+    let twin = twin(case);
+    let [train, test] = recordings(case).map(|recording| [recording]);
+    let began = clock();
+    let diagnosis = diagnose(&twin, &train, &test, Seed(0), &|_, _, _| {}).diagnosis;
+    let seconds = clock() - began;
+    let names: Vec<&str> = case.label.effects.iter().map(|effect| effect.id.as_str()).collect();
+    Trial {
+        verdict: diagnosis.verdict,
+        onset: diagnosis.location.onset,
+        intervals: intervals(&diagnosis, &train[0].name),
+        held_out: held_out(&diagnosis),
+        oracle: oracle(&twin, &train, &test, &names),
+        regression: regression(case),
+        found: diagnosis.effects.into_iter().map(found).collect(),
+        seconds,
+    }
+}
+
+fn found(effect: Effect) -> Found {
+    Found {
+        mechanism: effect.mechanism,
+        confidence: effect.confidence,
+        rivals: effect.rivals.into_iter().map(|rival| rival.mechanism).collect(),
+        parameters: effect.parameters.into_iter().map(|(name, estimate)| (name, Fitted::from(&estimate))).collect(),
+    }
+}
+
+impl From<&Estimate> for Fitted {
+    fn from(estimate: &Estimate) -> Self {
+        Self { value: finite(estimate.value), std: Some(estimate.std).filter(|std| std.is_finite()) }
+    }
+}
+
+fn intervals(diagnosis: &Diagnosis, recording: &str) -> Vec<Span> {
+    let own = diagnosis.location.intervals.iter().filter(|interval| interval.recording == recording);
+    own.map(|interval| Span { start: interval.start, end: interval.end }).collect()
+}
+
+fn held_out(diagnosis: &Diagnosis) -> HeldOut {
+    let errors =
+        diagnosis.fit.first().map_or([f64::MAX; 3], |fit| [fit.nominal_rmse, fit.recalibrated_rmse, fit.trued_rmse]);
+    let [nominal, recalibrated, trued] = errors.map(finite);
+    HeldOut { nominal, recalibrated, trued }
+}
+
+/// JSON knows no infinity: what ran away is as far away as numbers go.
+pub(super) fn finite(value: f64) -> f64 {
+    if value.is_finite() { value } else { f64::MAX.copysign(value) }
+}
