@@ -3,26 +3,33 @@
 use std::path::{Path, PathBuf};
 
 use crate::io::{InputError, TwinFile, hint_among};
-use crate::market::{Execution, execution_twin};
-use crate::robot::{Joint, joint_assembly, joint_recordings};
-use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, calibrate, diagnose};
-use crate::sim2real::{Assembly, Plant, Recording, Seed, Simulator};
+use crate::market::execution_twin;
+use crate::robot::{
+    cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
+    tanks_assembly, tanks_recordings,
+};
+use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, Excitation, Profile, calibrate, diagnose};
+use crate::sim2real::{Assembly, Parameter, Plant, Recording, Seed, Simulator};
 
 use super::fitted::FittedTwin;
 use super::screen::Progress;
 
 /// The models a twin can name.
-const MODELS: [&str; 2] = ["joint", "execution"];
+const MODELS: [&str; 5] = ["joint", "cart_pole", "tanks", "equations", "execution"];
 
-/// A twin with its recordings.
-#[derive(Debug)]
-pub(super) enum Case {
-    Joint(Given<Joint>),
-    Execution(Given<Execution>),
+/// A twin with its recordings, whatever they are of.
+pub(super) struct Case(Box<dyn Trial>);
+
+/// What can be done with a twin and its recordings.
+trait Trial {
+    /// The same, in which the mechanisms of these ids are not known.
+    fn without(self: Box<Self>, ids: &[String]) -> Result<Box<dyn Trial>, InputError>;
+    fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed;
+    fn calibrate(&self, seed: Seed, progress: &Progress) -> (Calibration, FittedTwin);
+    fn parameters(&self) -> &[Parameter];
 }
 
-#[derive(Debug)]
-pub(super) struct Given<P: Plant> {
+struct Given<P: Plant> {
     twin: Assembly<P>,
     recordings: Vec<Recording<P::Stimulus>>,
     held_out: Vec<Recording<P::Stimulus>>,
@@ -35,6 +42,10 @@ pub(super) struct Diagnosed {
     /// The trued twin.
     pub trued: FittedTwin,
     pub comparisons: Vec<Comparison>,
+    /// Errors over the states they may depend on.
+    pub profiles: Vec<Profile>,
+    /// The commands of the next experiment, where one was designed.
+    pub excitation: Option<Excitation>,
 }
 
 impl Case {
@@ -44,71 +55,73 @@ impl Case {
     /// A model there is not, a recording that is fitted and held out, and what the domain's readers refuse.
     pub fn read(twin: &TwinFile, recordings: &[PathBuf], held_out: &[PathBuf]) -> Result<Self, InputError> {
         check_apart(recordings, held_out)?;
-        match twin.model.as_str() {
-            "joint" => Ok(Self::Joint(Given {
+        Ok(Self(match twin.model.as_str() {
+            "joint" => Box::new(Given {
                 twin: joint_assembly(twin)?,
                 recordings: joint_recordings(twin, recordings)?,
                 held_out: joint_recordings(twin, held_out)?,
-            })),
+            }),
+            "cart_pole" => Box::new(Given {
+                twin: cart_pole_assembly(twin)?,
+                recordings: cart_pole_recordings(twin, recordings)?,
+                held_out: cart_pole_recordings(twin, held_out)?,
+            }),
+            "tanks" => {
+                let recordings = tanks_recordings(twin, recordings)?;
+                let assembly = tanks_assembly(twin, &recordings)?;
+                Box::new(Given { twin: assembly, recordings, held_out: tanks_recordings(twin, held_out)? })
+            }
+            "equations" => {
+                let recordings = equations_recordings(twin, recordings)?;
+                let assembly = equations_assembly(twin, &recordings)?;
+                Box::new(Given { twin: assembly, recordings, held_out: equations_recordings(twin, held_out)? })
+            }
             "execution" => {
                 // Read together, so that the tape is read once.
                 let paths: Vec<PathBuf> = recordings.iter().chain(held_out).cloned().collect();
                 let (assembly, mut all) = execution_twin(twin, &paths)?;
                 let held_out = all.split_off(recordings.len());
-                Ok(Self::Execution(Given { twin: assembly, recordings: all, held_out }))
+                Box::new(Given { twin: assembly, recordings: all, held_out })
             }
             other => {
                 let error = twin.error(&["twin", "model"], format!("there is no model `{other}`"));
-                Err(error.maybe_hint(hint_among(other, &MODELS)))
+                return Err(error.maybe_hint(hint_among(other, &MODELS)));
             }
-        }
+        }))
     }
 
     /// The same case, in which the mechanisms of these ids are not known.
     ///
     /// # Errors
-    /// An id the registry of the twin's domain does not have either.
+    /// An id the registry of the twin's plant does not have either.
     pub fn without(self, ids: &[String]) -> Result<Self, InputError> {
-        Ok(match self {
-            Self::Joint(given) => Self::Joint(given.without(ids)?),
-            Self::Execution(given) => Self::Execution(given.without(ids)?),
-        })
+        self.0.without(ids).map(Self)
     }
 
     /// Finds what the twin leaves out.
     pub fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
-        match self {
-            Self::Joint(given) => given.diagnose(seed, progress),
-            Self::Execution(given) => given.diagnose(seed, progress),
-        }
+        self.0.diagnose(seed, progress)
     }
 
     /// Refits the parameters the twin has; gives the twin they make.
     pub fn calibrate(&self, seed: Seed, progress: &Progress) -> (Calibration, FittedTwin) {
-        match self {
-            Self::Joint(given) => given.calibrate(seed, progress),
-            Self::Execution(given) => given.calibrate(seed, progress),
-        }
+        self.0.calibrate(seed, progress)
     }
 
     /// Whether the twin has a parameter that a fit may move.
     pub fn has_free_parameters(&self) -> bool {
-        let parameters = match self {
-            Self::Joint(given) => given.twin.parameters(),
-            Self::Execution(given) => given.twin.parameters(),
-        };
-        parameters.iter().any(|parameter| !parameter.frozen())
+        self.0.parameters().iter().any(|parameter| !parameter.frozen())
     }
 }
 
-impl<P: Plant> Given<P> {
-    fn without(self, ids: &[String]) -> Result<Self, InputError> {
+impl<P: Plant> Trial for Given<P> {
+    fn without(self: Box<Self>, ids: &[String]) -> Result<Box<dyn Trial>, InputError> {
         let known: Vec<&str> = self.twin.registry().iter().map(|mechanism| mechanism.about().name).collect();
         if let Some(unknown) = ids.iter().find(|id| !known.contains(&id.as_str())) {
             let error = InputError::new("--without", format!("there is no mechanism `{unknown}`"));
             return Err(error.maybe_hint(hint_among(unknown, &known)));
         }
-        Ok(Self { twin: self.twin.excluding(ids), ..self })
+        Ok(Box::new(Self { twin: self.twin.excluding(ids), ..*self }))
     }
 
     fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
@@ -118,6 +131,8 @@ impl<P: Plant> Given<P> {
             trued: FittedTwin::of(&outcome.trued, &outcome.values, &outcome.std),
             diagnosis: outcome.diagnosis,
             comparisons: outcome.comparisons,
+            profiles: outcome.profiles,
+            excitation: outcome.excitation,
         }
     }
 
@@ -126,6 +141,10 @@ impl<P: Plant> Given<P> {
         let calibration = calibrate(&self.twin, &self.recordings, &self.held_out, seed, &tell);
         let twin = FittedTwin::of(&self.twin, &calibration.values, &calibration.std);
         (calibration, twin)
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        self.twin.parameters()
     }
 }
 

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use crate::io::{OutputFolder, Overwrite, TwinFile};
 use crate::report::diagnosis_page;
 use crate::sim2real::Seed;
-use crate::sim2real::diagnose::{Diagnosis, Verdict};
+use crate::sim2real::diagnose::{Diagnosis, EXPERIMENT_FILE, Excitation, Verdict};
 
 use super::case::{Case, Diagnosed};
 use super::figures::figures;
@@ -44,7 +44,7 @@ pub(super) struct Diagnose {
     /// Mechanisms to leave out of the registry: what is said without the right one shows what an answer is worth
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     without: Vec<String>,
-    /// Folder to write diagnosis.json, trued.toml and report.html into
+    /// Folder to write diagnosis.json, trued.toml and report.html into, and next_experiment.csv where these data cannot tell
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write over files that exist
@@ -86,8 +86,8 @@ impl FailOn {
     }
 }
 
-/// The files a diagnosis writes.
-pub(super) const FILES: [&str; 3] = ["diagnosis.json", "trued.toml", "report.html"];
+/// The files a diagnosis writes; the last only where the recordings cannot tell, and commands that could are plain numbers.
+pub(super) const FILES: [&str; 4] = ["diagnosis.json", "trued.toml", "report.html", EXPERIMENT_FILE];
 
 impl Diagnose {
     pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
@@ -132,7 +132,9 @@ pub(super) fn write(
     overwrite: Overwrite,
 ) -> Result<Vec<PathBuf>, Stop> {
     let diagnosis = &diagnosed.diagnosis;
-    let page = diagnosis_page(diagnosis, &figures(diagnosed.comparisons))?;
+    let experiment = diagnosed.excitation.as_ref().map(|excitation| commands(excitation, file));
+    let figures = figures(diagnosed.comparisons, diagnosed.profiles, diagnosed.excitation);
+    let page = diagnosis_page(diagnosis, &figures)?;
     let name = file.document().path().file_name().unwrap_or_default().to_string_lossy().replace(char::is_control, " ");
     // A sentence with line breaks would leave the comment.
     let summary = diagnosis.summary.replace(char::is_control, " ");
@@ -142,10 +144,24 @@ pub(super) fn write(
         diagnosed.trued.document(file).render(folder)
     );
     let mut output = OutputFolder::create(folder, overwrite)?;
-    for (name, text) in FILES.iter().zip([json(diagnosis)?, trued, page]) {
-        output.file(name, text.as_bytes())?;
+    for (name, text) in FILES.iter().zip([Some(json(diagnosis)?), Some(trued), Some(page), experiment]) {
+        if let Some(text) = text {
+            output.file(name, text.as_bytes())?;
+        }
     }
     Ok(output.finish()?)
+}
+
+/// The commands of an experiment as a recording has them, under the name its command column has.
+fn commands(excitation: &Excitation, file: &TwinFile) -> String {
+    let column = file.channels.get("command").map_or("u", |channel| channel.column.as_str());
+    let quoted = if column.contains(['"', ',', '\n', '\r']) {
+        format!("\"{}\"", column.replace('"', "\"\""))
+    } else {
+        column.to_owned()
+    };
+    let rows = excitation.time.iter().zip(&excitation.command).map(|(time, command)| format!("{time},{command}\n"));
+    format!("t,{quoted}\n") + &rows.collect::<String>()
 }
 
 #[cfg(test)]

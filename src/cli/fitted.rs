@@ -31,10 +31,11 @@ impl FittedTwin {
     /// `assembly` with `values` for its parameters and their standard deviations `std`, in their order.
     pub fn of<P: Plant>(assembly: &Assembly<P>, values: &[f64], std: &[f64]) -> Self {
         let mut estimates = values.iter().copied().zip(std.iter().copied());
-        let mut fitted = |parameters: &[Parameter]| -> Vec<Fitted> {
+        // A plant gives its own units; mechanisms declare theirs in general terms.
+        let mut fitted = |parameters: &[Parameter], general: bool| -> Vec<Fitted> {
             let one = |(p, (value, std)): (&Parameter, (f64, f64))| Fitted {
                 name: p.name.clone().into_owned(),
-                unit: assembly.unit(&p.unit),
+                unit: if general { assembly.unit(&p.unit) } else { p.unit.clone().into_owned() },
                 nominal: p.nominal,
                 value,
                 std,
@@ -43,8 +44,9 @@ impl FittedTwin {
             };
             parameters.iter().zip(estimates.by_ref()).map(one).collect()
         };
-        let own = fitted(&assembly.plant().parameters());
-        let mechanisms = assembly.mechanisms().map(|(row, _, parameters)| (row.about().name, fitted(parameters))).collect();
+        let own = fitted(&assembly.plant().parameters(), false);
+        let mechanisms =
+            assembly.mechanisms().map(|(row, _, parameters)| (row.about().name, fitted(parameters, true))).collect();
         Self { own, mechanisms }
     }
 

@@ -5,7 +5,9 @@ use serde::Serialize;
 
 use crate::market::{self, Execution};
 use crate::report::quantity::number;
-use crate::robot::{self, Joint};
+use crate::robot::{
+    CART_POLE_MECHANISMS, CartPole, EQUATIONS_MECHANISMS, Equations, Joint, MECHANISMS, TANKS_MECHANISMS, Tanks,
+};
 use crate::sim2real::{About, Parameter, Plant, Registry, Site};
 
 use super::screen::Screen;
@@ -35,6 +37,8 @@ struct Listing {
 struct Row {
     id: &'static str,
     domains: Vec<&'static str>,
+    /// The models of twins it can be found missing in.
+    plants: Vec<&'static str>,
     site: Site,
     title: &'static str,
     law: &'static str,
@@ -75,11 +79,14 @@ impl Mechanisms {
     }
 }
 
-/// Both registries, merged by id, in the order of the sites.
+/// The registries of all plants, merged by id, in the order of the sites.
 fn rows() -> Vec<Row> {
     let mut rows = Vec::new();
-    add::<Joint>(&mut rows, "robot", robot::MECHANISMS);
-    add::<Execution>(&mut rows, "market", market::MECHANISMS);
+    add::<Joint>(&mut rows, "robot", "joint", MECHANISMS);
+    add::<CartPole>(&mut rows, "robot", "cart_pole", CART_POLE_MECHANISMS);
+    add::<Tanks>(&mut rows, "robot", "tanks", TANKS_MECHANISMS);
+    add::<Equations>(&mut rows, "robot", "equations", EQUATIONS_MECHANISMS);
+    add::<Execution>(&mut rows, "market", "execution", market::MECHANISMS);
     rows.sort_by_key(|row| match row.site {
         Site::Command => 0,
         Site::Plant => 1,
@@ -88,7 +95,7 @@ fn rows() -> Vec<Row> {
     rows
 }
 
-fn add<P: Plant>(rows: &mut Vec<Row>, domain: &'static str, registry: Registry<P>) {
+fn add<P: Plant>(rows: &mut Vec<Row>, domain: &'static str, plant: &'static str, registry: Registry<P>) {
     for mechanism in registry {
         let about = mechanism.about();
         let at = rows.iter().position(|row| row.id == about.name).unwrap_or_else(|| {
@@ -96,14 +103,21 @@ fn add<P: Plant>(rows: &mut Vec<Row>, domain: &'static str, registry: Registry<P
             rows.len() - 1
         });
         let row = &mut rows[at];
-        row.domains.push(domain);
+        note(&mut row.domains, domain);
+        note(&mut row.plants, plant);
         for form in mechanism.forms(&Default::default()) {
             let parameters: Vec<ParameterRow> = form.parameters.iter().map(parameter).collect();
             match row.forms.iter_mut().find(|known| known.name == form.name && known.parameters == parameters) {
-                Some(known) => known.domains.push(domain),
+                Some(known) => note(&mut known.domains, domain),
                 None => row.forms.push(FormRow { name: form.name, domains: vec![domain], parameters }),
             }
         }
+    }
+}
+
+fn note(names: &mut Vec<&'static str>, name: &'static str) {
+    if !names.contains(&name) {
+        names.push(name);
     }
 }
 
@@ -111,6 +125,7 @@ fn row(about: About) -> Row {
     Row {
         id: about.name,
         domains: Vec::new(),
+        plants: Vec::new(),
         site: about.site,
         title: about.title,
         law: about.law,
@@ -133,13 +148,13 @@ fn parameter(parameter: &Parameter) -> ParameterRow {
 }
 
 fn table(screen: &Screen, rows: &[Row]) -> String {
-    let mut table = screen.table(["mechanism", "site", "domains", "parameters", "law; source"]);
+    let mut table = screen.table(["mechanism", "site", "models", "parameters", "law; source"]);
     for row in rows {
         let forms: Vec<String> = row.forms.iter().map(|form| told(form, row.domains.len())).collect();
         table.add_row([
             row.id.to_owned(),
             row.site.to_string(),
-            row.domains.join(", "),
+            row.plants.join(", "),
             forms.join("\nor "),
             format!("{}; {}", row.law, row.source),
         ]);

@@ -3,8 +3,10 @@
 
 mod check;
 mod columnar;
+mod controller_entry;
 mod csv;
 mod document;
+mod equation_sections;
 mod error;
 mod feed_format;
 mod folder;
@@ -25,14 +27,16 @@ mod twin_mechanism;
 mod unit;
 
 pub use check::{Increase, check_increasing, check_not_negative, check_positive};
+pub use controller_entry::{ControllerEntry, ControllerKind, DerivativeOf};
 pub use document::{Document, read_toml};
+pub use equation_sections::{AttachEntry, EquationSections, InputEntry, OutputEntry, StateEntry};
 pub use error::{InputError, Place, did_you_mean, hint_among, listed};
 pub use feed_format::FeedFormat;
 pub use folder::table_in;
 pub use instrument_entry::InstrumentEntry;
 pub use output_folder::{OutputFolder, Overwrite, write_file, write_table};
 pub use output_table::{OutputTable, Values};
-pub use quantity::{DEFAULT_UNCERTAINTY, MechanismEntry, Quantity};
+pub use quantity::{DEFAULT_UNCERTAINTY, Exactly, MechanismEntry, Quantity};
 pub use run_file::{DataEntry, FeedKind, RunFile, RunSection};
 pub use source::file_hash;
 pub use stamp::{Stamp, common_spacing};

@@ -66,7 +66,14 @@ impl Quantity {
 
 impl<'de> Deserialize<'de> for Quantity {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Number;
+        Self::deserialize_with(deserializer, DEFAULT_UNCERTAINTY)
+    }
+}
+
+impl Quantity {
+    /// A number that is uncertain to `uncertainty` where the document does not say.
+    fn deserialize_with<'de, D: Deserializer<'de>>(deserializer: D, uncertainty: f64) -> Result<Self, D::Error> {
+        struct Number(f64);
         impl<'de> Visitor<'de> for Number {
             type Value = Quantity;
 
@@ -75,20 +82,30 @@ impl<'de> Deserialize<'de> for Quantity {
             }
 
             fn visit_i64<E>(self, value: i64) -> Result<Quantity, E> {
-                Ok(Quantity::bare(value as f64))
+                Ok(Quantity { uncertainty: self.0, ..Quantity::bare(value as f64) })
             }
 
             fn visit_f64<E>(self, value: f64) -> Result<Quantity, E> {
-                Ok(Quantity::bare(value))
+                Ok(Quantity { uncertainty: self.0, ..Quantity::bare(value) })
             }
 
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Quantity, A::Error> {
                 let table = QuantityTable::deserialize(MapAccessDeserializer::new(map))?;
-                let uncertainty = table.uncertainty.unwrap_or(DEFAULT_UNCERTAINTY);
+                let uncertainty = table.uncertainty.unwrap_or(self.0);
                 Ok(Quantity { value: table.value, unit: table.unit, uncertainty })
             }
         }
-        deserializer.deserialize_any(Number)
+        deserializer.deserialize_any(Number(uncertainty))
+    }
+}
+
+/// A number that is known exactly where a document does not say how uncertain it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exactly(pub Quantity);
+
+impl<'de> Deserialize<'de> for Exactly {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Quantity::deserialize_with(deserializer, 0.0).map(Self)
     }
 }
 

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use chrono_tz::Tz;
 use serde::{Deserialize, Serialize};
 
+use super::controller_entry::ControllerEntry;
 use super::document::Document;
+use super::equation_sections::{AttachEntry, EquationSections, InputEntry, Named, OutputEntry, StateEntry, in_order};
 use super::error::InputError;
 use super::feed_format::{FeedFormat, check_file, zone};
 use super::instrument_entry::{InstrumentEntry, check_instruments};
@@ -24,10 +26,16 @@ pub struct TwinFile {
     document: Document,
     /// `model` of `[twin]`: the plant's name.
     pub model: String,
+    /// `step` of `[twin]`: the longest step of integration [s], where one is given.
+    pub step: Option<f64>,
     /// `[parameters]`: nominal values.
     pub parameters: BTreeMap<String, Quantity>,
     /// `[channels]`: which columns of a recording are which.
     pub channels: BTreeMap<String, ChannelEntry>,
+    /// The sections of a twin given as equations; empty of any other.
+    pub equations: EquationSections,
+    /// `[controller]`: what closes the loop, where it is closed.
+    pub controller: Option<ControllerEntry>,
     /// `[[mechanism]]`: what the twin models already.
     pub mechanisms: Vec<MechanismEntry>,
     /// `[assumptions]`: what a backtest assumes of every order.
@@ -112,6 +120,20 @@ struct TwinTable {
     #[serde(default)]
     channels: BTreeMap<String, ChannelEntry>,
     #[serde(default)]
+    states: Named<StateEntry>,
+    #[serde(default)]
+    inputs: Named<InputEntry>,
+    #[serde(default)]
+    definitions: Named<String>,
+    #[serde(default)]
+    derivatives: Named<String>,
+    #[serde(default)]
+    next: Named<String>,
+    #[serde(default)]
+    outputs: Named<OutputEntry>,
+    attach: Option<AttachEntry>,
+    controller: Option<ControllerEntry>,
+    #[serde(default)]
     mechanism: Vec<MechanismEntry>,
     assumptions: Option<Assumptions>,
     #[serde(default)]
@@ -123,6 +145,7 @@ struct TwinTable {
 #[serde(deny_unknown_fields)]
 struct TwinSection {
     model: String,
+    step: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -158,17 +181,41 @@ impl TwinFile {
         for (name, quantity) in &table.parameters {
             quantity.check(&document, &["parameters", name])?;
         }
+        if let Some(step) = table.twin.step.filter(|step| !step.is_finite() || *step <= 0.0) {
+            let error = document.error(&["twin", "step"], "expected a step of integration above 0").found(step);
+            return Err(error.hint("it is the longest step in seconds; left out, it follows from the distance of rows"));
+        }
         check_mechanisms(&document, &table.mechanism)?;
         check_instruments(&document, &table.instrument)?;
         if let Some(assumptions) = &table.assumptions {
             check_assumptions(&document, assumptions)?;
         }
+        let equations = EquationSections {
+            states: in_order(table.states),
+            inputs: in_order(table.inputs),
+            definitions: in_order(table.definitions),
+            derivatives: in_order(table.derivatives),
+            next: in_order(table.next),
+            outputs: in_order(table.outputs),
+            attach: table.attach,
+        };
+        equations.check(&document)?;
+        if let Some(section) = equations.first().filter(|_| table.twin.model != "equations") {
+            let error = document.error(&[section], format!("the model `{}` has no section [{section}]", table.twin.model));
+            return Err(error.hint("it is for `model = \"equations\"`"));
+        }
+        if let Some(controller) = &table.controller {
+            controller.check(&document)?;
+        }
         let market = table.market.map(|market| market_files(&document, market)).transpose()?;
         Ok(Self {
             document,
             model: table.twin.model,
+            step: table.twin.step,
             parameters: table.parameters,
             channels: table.channels,
+            equations,
+            controller: table.controller,
             mechanisms: table.mechanism,
             assumptions: table.assumptions,
             instruments: table.instrument,
@@ -203,7 +250,7 @@ impl TwinFile {
     #[must_use]
     pub fn render(&self, folder: &Path) -> String {
         let mut out = String::new();
-        section(&mut out, "[twin]", [("model", Some(text(&self.model)))]);
+        section(&mut out, "[twin]", [("model", Some(text(&self.model))), ("step", self.step.map(float))]);
         let parameters = self.parameters.iter().map(|(name, q)| (name.as_str(), Some(table_form(q))));
         section(&mut out, "[parameters]", parameters);
         let channels = self.channels.iter().map(|(name, channel)| {
@@ -211,6 +258,10 @@ impl TwinFile {
             (name.as_str(), Some(format!("{{ column = {}{unit} }}", text(&channel.column))))
         });
         section(&mut out, "[channels]", channels);
+        self.equations.render(&mut out);
+        if let Some(controller) = &self.controller {
+            controller.render(&mut out);
+        }
         for mechanism in &self.mechanisms {
             let parameters = mechanism.parameters.iter().map(|(key, q)| (key.as_str(), Some(short_form(q))));
             section(&mut out, "[[mechanism]]", [("name", Some(text(&mechanism.name)))].into_iter().chain(parameters));
@@ -271,7 +322,7 @@ fn market_files(document: &Document, market: MarketTable) -> Result<MarketFiles,
 }
 
 /// Adds a section, unless it has no keys; keys without a value are left out.
-fn section<'a>(out: &mut String, head: &str, keys: impl IntoIterator<Item = (&'a str, Option<String>)>) {
+pub(super) fn section<'a>(out: &mut String, head: &str, keys: impl IntoIterator<Item = (&'a str, Option<String>)>) {
     let lines: Vec<String> =
         keys.into_iter().filter_map(|(name, value)| Some(format!("{} = {}\n", key(name), value?))).collect();
     if lines.is_empty() {
@@ -309,18 +360,24 @@ fn table_form(quantity: &Quantity) -> String {
     format!("{{ value = {}{unit}, uncertainty = {} }}", float(quantity.value), float(quantity.uncertainty))
 }
 
+/// A bare number where it is known exactly.
+pub(super) fn exact_form(quantity: &Quantity) -> String {
+    let bare = quantity.unit.is_none() && quantity.uncertainty == 0.0;
+    if bare { float(quantity.value) } else { table_form(quantity) }
+}
+
 /// A bare number where nothing more is known than that.
 fn short_form(quantity: &Quantity) -> String {
     if *quantity == Quantity::bare(quantity.value) { float(quantity.value) } else { table_form(quantity) }
 }
 
 /// A finite number, in the shortest form that reads back as the same bits.
-fn float(value: f64) -> String {
+pub(super) fn float(value: f64) -> String {
     format!("{value:?}")
 }
 
 /// A basic string of one line, which may be a key too.
-fn text(value: &str) -> String {
+pub(super) fn text(value: &str) -> String {
     let mut out = String::from('"');
     for c in value.chars() {
         match c {

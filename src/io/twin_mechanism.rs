@@ -44,6 +44,11 @@ pub fn listed_mechanism<P: Plant>(
         let error = document.error(&["mechanism", &number], format!("the parameters of `{}` are not complete", entry.name));
         return Err(error.hint(format!("give {}", ways.join(", or "))));
     };
+    let site = mechanism.site(form);
+    if !plant.open_to(site) {
+        let message = format!("`{}` has nothing to act on: the twin does not say what moves", entry.name);
+        return Err(document.error(&["mechanism", &number, "name"], message).hint("say it in a section `[attach]`"));
+    }
     let mut parameters = forms[form].parameters.clone();
     for parameter in &mut parameters {
         let Some(quantity) = entry.parameter(&parameter.name) else { continue };

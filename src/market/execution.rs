@@ -66,6 +66,9 @@ impl Observation for Report {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Execution;
 
+/// What is seen of an order: cost against the assumed price, fee, part filled.
+static CHANNELS: &[Channel] = &[Channel::new("cost", "bps"), Channel::new("fee", "bps"), Channel::new("filled", "")];
+
 impl Plant for Execution {
     type Command = InFlight;
     type Input = Met;
@@ -83,8 +86,8 @@ impl Plant for Execution {
         Clock::Event
     }
 
-    fn channels(&self) -> &'static [Channel] {
-        &[Channel { name: "cost", unit: "bps" }, Channel { name: "fee", unit: "bps" }, Channel { name: "filled", unit: "" }]
+    fn channels(&self) -> &[Channel] {
+        CHANNELS
     }
 
     fn parameters(&self) -> Vec<Parameter> {

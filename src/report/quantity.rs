@@ -1,5 +1,7 @@
 //! Numbers as a reader wants them: as many digits as mean something, thousands apart, a true minus.
 
+use crate::sim2real::diagnose::Bin;
+
 /// What stands for a value that is not defined.
 pub(crate) const UNDEFINED: &str = "\u{2013}";
 
@@ -60,6 +62,18 @@ pub(crate) fn percents(low: f64, high: f64) -> String {
         return UNDEFINED.into();
     }
     format!("{} to {}\u{a0}%", decimals(100.0 * low, 1), decimals(100.0 * high, 1))
+}
+
+/// A range of a state: `|velocity| < 0.2 rad/s`, `position 0.3 to 0.5 rad`.
+pub(crate) fn range(bin: &Bin) -> String {
+    let value = |v: f64| significant(v, 2);
+    let text = match (bin.from, bin.to) {
+        (Some(from), Some(to)) => format!("{} {} to {}", bin.on, value(from), value(to)),
+        (Some(from), None) => format!("{} > {}", bin.on, value(from)),
+        (None, Some(to)) => format!("{} < {}", bin.on, value(to)),
+        (None, None) => return bin.on.clone(),
+    };
+    with_unit(&text, &bin.unit)
 }
 
 /// A number on an axis: no more digits than it needs, millions as `M`.

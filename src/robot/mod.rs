@@ -1,11 +1,29 @@
 //! Robots: plants that move, and what their simulators tend to leave out.
 
+mod cart_pole;
+mod equations;
+mod estimate;
 mod joint;
 pub mod mechanism;
+mod mover;
+mod runge_kutta;
+mod signal;
+mod tanks;
 #[cfg(feature = "io")]
 mod twin;
 
-pub use joint::{Axis, Commands, Joint, JointDynamics, JointEffect, JointState, Posture, Torque};
-pub use mechanism::MECHANISMS;
+pub use cart_pole::{CartPole, CartPoleDynamics, CartPoleView};
+pub use equations::{
+    Attachment, Driving, EquationError, EquationSystem, Equations, EquationsDynamics, InputVariable, Measurements,
+    OutputVariable, Outputs, StateVariable,
+};
+pub use joint::{Axis, Joint, JointDynamics, Posture};
+pub use mechanism::{CART_POLE_MECHANISMS, EQUATIONS_MECHANISMS, MECHANISMS, TANKS_MECHANISMS};
+pub use mover::{Motion, Mover, Push};
+pub use signal::{Commands, Signal};
+pub use tanks::{Level, Levels, Rims, Tanks, TanksDynamics};
 #[cfg(feature = "io")]
-pub use twin::{joint_assembly, joint_recordings};
+pub use twin::{
+    cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
+    tanks_assembly, tanks_recordings,
+};

@@ -1,63 +1,76 @@
-//! Joint twins: what a simulator of a joint is told today, and the recordings it is held to.
+//! Twins of robots: what a simulator is told today, and the recordings it is held to. What is the same for every plant that
+//! is sampled stands here, the rest in a file for each.
 
-use std::path::PathBuf;
+mod cart_pole;
+mod equations;
+mod joint;
+mod tanks;
 
-use super::{Axis, Commands, Joint, MECHANISMS};
+use std::path::Path;
+
+use super::Commands;
 use crate::io::{
     ChannelEntry, InputError, Need, Quantity, TIME_COLUMN, TrajectoryTable, TwinFile, hint_among, listed_mechanism,
     read_trajectory,
 };
-use crate::sim2real::{Assembly, Measured, Recording};
+use crate::sim2real::{Assembly, Measured, Plant, Recording, Registry};
+
+pub use cart_pole::{cart_pole_assembly, cart_pole_recordings};
+pub use equations::{equations_assembly, equations_recordings};
+pub use joint::{joint_assembly, joint_recordings};
+pub use tanks::{tanks_assembly, tanks_recordings};
 
 /// Rows a recording needs at the least: fewer say nothing about noise, let alone about what is missing.
 const FEWEST_ROWS: usize = 100;
-/// Longest median distance of rows [s]: a servo that is sampled more slowly than this cannot be followed, and a time in
-/// milliseconds looks like it.
+/// Longest median distance of rows of what moves [s]: a servo that is sampled more slowly than this cannot be followed, and
+/// a time in milliseconds looks like it.
 const LONGEST_SPACING: f64 = 0.5;
 /// A distance of rows this many times the median is a gap, over which no motion can be followed.
 const GAP: f64 = 1_000.0;
 /// Positions, velocities and commands are less than this in any unit of theirs.
 const LARGEST: f64 = 1e9;
 
-/// The joint a twin describes, with what it models already.
-///
-/// # Errors
-/// A twin of another model; parameters that are missing, unknown, of another unit or without meaning (an inertia of 0);
-/// mechanisms the registry does not know.
-pub fn joint_assembly(twin: &TwinFile) -> Result<Assembly<Joint>, InputError> {
-    if twin.model != "joint" {
-        return Err(twin.error(&["twin", "model"], "expected the model \"joint\"").found_text(&twin.model));
-    }
-    let axis = axis(twin)?;
-    let names = Joint::parameter_names(axis);
-    let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
-    if let Some(unknown) = twin.parameters.keys().find(|name| !known.contains(&name.as_str())) {
-        let error = twin.error(&["parameters", unknown], format!("a joint has no parameter `{unknown}`"));
-        return Err(error.maybe_hint(hint_among(unknown, &known)));
-    }
-    let mut values = [0.0; 4];
-    let mut uncertainty = [0.0; 4];
-    for (k, (name, unit)) in names.into_iter().enumerate() {
-        let quantity = parameter(twin, name, unit)?;
-        (values[k], uncertainty[k]) = (quantity.value, quantity.uncertainty);
-    }
-    let joint = Joint::new(axis, values, uncertainty);
-    let mut assembly = Assembly::new(joint.clone(), MECHANISMS);
-    for (index, entry) in twin.mechanisms.iter().enumerate() {
-        let (mechanism, form, parameters) = listed_mechanism(twin.document(), index, entry, &joint, MECHANISMS)?;
-        assembly = assembly.with_mechanism(mechanism, form, parameters);
-    }
-    Ok(assembly)
+/// What a parameter of a plant must be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Must {
+    BePositive,
+    NotBeNegative,
+    NotBeZero,
 }
 
-/// A parameter of the twin. A joint that nothing weighs on, or that is driven by torques, need not say so.
-fn parameter(twin: &TwinFile, name: &str, unit: &str) -> Result<Quantity, InputError> {
-    let default = match name {
-        "gravity_torque" => Some(0.0),
-        "gain" => Some(1.0),
-        _ => None,
-    };
-    let Some(quantity) = twin.parameters.get(name) else {
+/// A parameter that a plant has.
+#[derive(Debug, Clone)]
+struct Wanted {
+    name: &'static str,
+    unit: String,
+    must: Option<Must>,
+    /// The value, known exactly, where the twin does not say.
+    default: Option<f64>,
+}
+
+/// Values and relative uncertainties of the parameters `wanted` of the twin, in their order; `plant` is what it is in a
+/// sentence ("a joint").
+fn parameters<const N: usize>(
+    twin: &TwinFile,
+    plant: &str,
+    wanted: &[Wanted; N],
+) -> Result<([f64; N], [f64; N]), InputError> {
+    let known = wanted.each_ref().map(|wanted| wanted.name);
+    if let Some(unknown) = twin.parameters.keys().find(|name| !known.contains(&name.as_str())) {
+        let error = twin.error(&["parameters", unknown], format!("{plant} has no parameter `{unknown}`"));
+        return Err(error.maybe_hint(hint_among(unknown, &known)));
+    }
+    let (mut values, mut uncertainty) = ([0.0; N], [0.0; N]);
+    for (k, wanted) in wanted.iter().enumerate() {
+        let quantity = parameter(twin, wanted)?;
+        (values[k], uncertainty[k]) = (quantity.value, quantity.uncertainty);
+    }
+    Ok((values, uncertainty))
+}
+
+fn parameter(twin: &TwinFile, wanted: &Wanted) -> Result<Quantity, InputError> {
+    let Wanted { name, unit, must, default } = wanted;
+    let Some(quantity) = twin.parameters.get(*name) else {
         let exactly = |value| Quantity { value, unit: None, uncertainty: 0.0 };
         return default.map(exactly).ok_or_else(|| {
             twin.error(&["parameters"], format!("the parameter `{name}` is missing"))
@@ -65,30 +78,53 @@ fn parameter(twin: &TwinFile, name: &str, unit: &str) -> Result<Quantity, InputE
         });
     };
     twin.check_unit(&["parameters", name], quantity.unit.as_deref(), unit)?;
-    let wrong = match name {
-        "inertia" if quantity.value <= 0.0 => Some("expected an inertia above 0"),
-        "viscous_friction" if quantity.value < 0.0 => Some("expected a viscous friction of at least 0"),
-        "gain" if quantity.value == 0.0 => Some("expected a gain other than 0"),
-        _ => None,
+    let wrong = match must {
+        Some(Must::BePositive) if quantity.value <= 0.0 => "above 0",
+        Some(Must::NotBeNegative) if quantity.value < 0.0 => "of at least 0",
+        Some(Must::NotBeZero) if quantity.value == 0.0 => "other than 0",
+        _ => return Ok(quantity.clone()),
     };
-    match wrong {
-        Some(what) => {
-            Err(twin.error(&["parameters", name], what).found(quantity.value).hint(format!("its unit is [{unit}]")))
-        }
-        None => Ok(quantity.clone()),
+    let error = twin.error(&["parameters", name], format!("expected a value of `{name}` {wrong}"));
+    Err(error.found(quantity.value).hint(format!("its unit is [{unit}]")))
+}
+
+/// The plant with the mechanisms that the twin lists.
+fn assembly<P: Plant>(twin: &TwinFile, plant: P, registry: Registry<P>) -> Result<Assembly<P>, InputError> {
+    let mut assembly = Assembly::new(plant.clone(), registry);
+    for (index, entry) in twin.mechanisms.iter().enumerate() {
+        let (mechanism, form, parameters) = listed_mechanism(twin.document(), index, entry, &plant, registry)?;
+        assembly = assembly.with_mechanism(mechanism, form, parameters);
+    }
+    Ok(assembly)
+}
+
+/// Holds the twin to be of the model `name`.
+fn check_model(twin: &TwinFile, name: &str) -> Result<(), InputError> {
+    if twin.model == name {
+        return Ok(());
+    }
+    Err(twin.error(&["twin", "model"], format!("expected the model \"{name}\"")).found_text(&twin.model))
+}
+
+/// Refuses a step of integration for a plant that has its own.
+fn check_no_step(twin: &TwinFile) -> Result<(), InputError> {
+    match twin.step {
+        None => Ok(()),
+        Some(step) => Err(twin
+            .error(&["twin", "step"], format!("`{}` is integrated at 1 ms and finer", twin.model))
+            .found(step)
+            .hint("leave `step` out: it is for models whose rows may be seconds apart")),
     }
 }
 
-/// Whether the joint turns or slides: as the unit of its position says.
-fn axis(twin: &TwinFile) -> Result<Axis, InputError> {
-    let position = channel(twin, "position")?;
-    match position.unit.as_deref().map(str::trim) {
-        None | Some("rad") => Ok(Axis::Rotary),
-        Some("m") => Ok(Axis::Linear),
-        Some(other) => Err(twin
-            .error(&["channels", "position", "unit"], "expected a position in rad or in m")
-            .found_text(other)
-            .hint("convert the column; 1 deg = 0.017453292519943295 rad, 1 mm = 0.001 m")),
+/// Holds the twin's channels to be among `known`; `plant` is what it is in a sentence ("a joint").
+fn check_channels(twin: &TwinFile, plant: &str, known: &[&str]) -> Result<(), InputError> {
+    match twin.channels.keys().find(|name| !known.contains(&name.as_str())) {
+        None => Ok(()),
+        Some(unknown) => {
+            let error = twin.error(&["channels", unknown], format!("{plant} has no channel `{unknown}`"));
+            Err(error.maybe_hint(hint_among(unknown, known)))
+        }
     }
 }
 
@@ -99,42 +135,69 @@ fn channel<'a>(twin: &'a TwinFile, name: &str) -> Result<&'a ChannelEntry, Input
     })
 }
 
-/// The recordings at `paths`, their columns as the twin's channels say.
-///
-/// # Errors
-/// Channels that are missing, unknown or of another unit, and what
-/// [`read_trajectory`] refuses; a recording too short to tell anything.
-pub fn joint_recordings(twin: &TwinFile, paths: &[PathBuf]) -> Result<Vec<Recording<Commands>>, InputError> {
-    let known = ["command", "position", "velocity"];
-    if let Some(unknown) = twin.channels.keys().find(|name| !known.contains(&name.as_str())) {
-        let error = twin.error(&["channels", unknown], format!("a joint has no channel `{unknown}`"));
-        return Err(error.maybe_hint(hint_among(unknown, &known)));
-    }
-    let units = match axis(twin)? {
-        Axis::Rotary => ["rad", "rad/s"],
-        Axis::Linear => ["m", "m/s"],
-    };
-    if let Some(velocity) = twin.channels.get("velocity") {
-        twin.check_unit(&["channels", "velocity", "unit"], velocity.unit.as_deref(), units[1])?;
-    }
-    paths.iter().map(|path| recording(twin, path, units)).collect()
+/// A channel that is seen: its name, the unit of its samples, its column.
+#[derive(Debug, Clone)]
+struct Seen {
+    name: String,
+    unit: String,
+    column: String,
 }
 
-fn recording(twin: &TwinFile, path: &PathBuf, units: [&str; 2]) -> Result<Recording<Commands>, InputError> {
-    let (command, position) = (channel(twin, "command")?, channel(twin, "position")?);
-    let mut columns =
-        vec![("command", command.column.as_str(), Need::EveryRow), ("position", position.column.as_str(), Need::SomeRows)];
-    if let Some(velocity) = twin.channels.get("velocity") {
-        columns.push(("velocity", velocity.column.as_str(), Need::SomeRows));
+/// The channels of `units`, which are names and units, that the twin names, each held to its unit.
+fn seen(twin: &TwinFile, units: &[(&str, &str)]) -> Result<Vec<Seen>, InputError> {
+    let mut seen = Vec::new();
+    for (name, unit) in units {
+        let Some(entry) = twin.channels.get(*name) else { continue };
+        twin.check_unit(&["channels", name, "unit"], entry.unit.as_deref(), unit)?;
+        seen.push(Seen { name: (*name).to_owned(), unit: (*unit).to_owned(), column: entry.column.clone() });
     }
-    let table = read_trajectory(path, &columns)?;
+    Ok(seen)
+}
+
+/// What a recording is read for.
+#[derive(Debug, Clone)]
+struct Columns {
+    /// What drives the plant, in every row: what it is called, and its column.
+    driving: Vec<(String, String)>,
+    /// What is seen of it.
+    seen: Vec<Seen>,
+    /// Longest median distance of rows [s], where there is one that cannot be.
+    longest_spacing: Option<f64>,
+}
+
+/// A recording as it was read.
+#[derive(Debug)]
+struct Samples {
+    name: String,
+    time: Vec<f64>,
+    driving: Vec<Vec<f64>>,
+    measured: Vec<Measured>,
+}
+
+impl Samples {
+    /// The recording of a plant that nothing drives but its command.
+    fn commanded(mut self) -> Recording<Commands> {
+        let commands = if self.driving.is_empty() { Vec::new() } else { self.driving.swap_remove(0) };
+        Recording { name: self.name, stimulus: Commands(commands), measured: self.measured, time: self.time }
+    }
+}
+
+/// Reads the recording at `path`.
+///
+/// # Errors
+/// What [`read_trajectory`] refuses; a recording too short to tell anything; times and values that cannot be.
+fn read(path: &Path, columns: &Columns) -> Result<Samples, InputError> {
+    let driving = columns.driving.iter().map(|(role, column)| (role.as_str(), column.as_str(), Need::EveryRow));
+    let seen = columns.seen.iter().map(|seen| (seen.name.as_str(), seen.column.as_str(), Need::SomeRows));
+    let roles: Vec<(&str, &str, Need)> = driving.chain(seen).collect();
+    let table = read_trajectory(path, &roles)?;
     if table.time.len() < FEWEST_ROWS {
         return Err(InputError::new(table.table.path(), format!("expected at least {FEWEST_ROWS} rows"))
             .found(table.time.len())
             .hint("record for longer: a diagnosis fits on one stretch and proves on another"));
     }
-    check_spacing(&table)?;
-    for (role, column, _) in &columns {
+    check_spacing(&table, columns.longest_spacing)?;
+    for (role, column, _) in &roles {
         let values = table.column(role).unwrap_or_default();
         if let Some(row) = values.iter().position(|v| v.is_some_and(|v| v.abs() > LARGEST)) {
             let found = values[row].unwrap_or_default();
@@ -147,36 +210,32 @@ fn recording(twin: &TwinFile, path: &PathBuf, units: [&str; 2]) -> Result<Record
                 ));
         }
     }
-    let measured = ["position", "velocity"]
-        .into_iter()
-        .zip(units)
-        .filter_map(|(name, unit)| {
-            let samples = table.column(name)?.to_vec();
-            Some(Measured { channel: name.to_owned(), unit: unit.to_owned(), samples })
-        })
-        .collect();
-    Ok(Recording {
+    let measured = |seen: &Seen| {
+        let samples = table.column(&seen.name)?.to_vec();
+        Some(Measured { channel: seen.name.clone(), unit: seen.unit.clone(), samples })
+    };
+    Ok(Samples {
         name: path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned()),
-        stimulus: Commands(table.complete("command").unwrap_or_default()),
-        measured,
+        driving: columns.driving.iter().map(|(role, _)| table.complete(role).unwrap_or_default()).collect(),
+        measured: columns.seen.iter().filter_map(measured).collect(),
         time: table.time,
     })
 }
 
-/// Refuses times that no motion of a joint can be followed in.
-fn check_spacing(table: &TrajectoryTable) -> Result<(), InputError> {
+/// Refuses times that no motion can be followed in.
+fn check_spacing(table: &TrajectoryTable, longest: Option<f64>) -> Result<(), InputError> {
     let mut spacings: Vec<f64> = table.time.windows(2).map(|w| w[1] - w[0]).collect();
     let widest = spacings.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map(|(row, width)| (row, *width));
     spacings.sort_by(f64::total_cmp);
     let median = spacings[spacings.len() / 2];
-    if median > LONGEST_SPACING {
-        return Err(InputError::new(table.table.path(), format!("expected rows at most {LONGEST_SPACING} s apart"))
+    if let Some(longest) = longest.filter(|longest| median > *longest) {
+        return Err(InputError::new(table.table.path(), format!("expected rows at most {longest} s apart"))
             .in_column(TIME_COLUMN)
             .found(median)
             .hint("`t` is in seconds: divide milliseconds by 1000, and take the recording's start off an epoch"));
     }
     match widest {
-        Some((row, width)) if width > (GAP * median).max(LONGEST_SPACING) => {
+        Some((row, width)) if width > (GAP * median).max(longest.unwrap_or(0.0)) => {
             let message = format!("expected no gap, found one of {width} s where rows are {median} s apart");
             Err(table
                 .table
@@ -185,4 +244,11 @@ fn check_spacing(table: &TrajectoryTable) -> Result<(), InputError> {
         }
         _ => Ok(()),
     }
+}
+
+/// Median distance of the rows of all `times` [s]; none where there are no two rows.
+fn median_spacing<'a>(times: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
+    let mut spacings: Vec<f64> = times.flat_map(|time| time.windows(2).map(|w| w[1] - w[0])).collect();
+    spacings.sort_by(f64::total_cmp);
+    spacings.get(spacings.len() / 2).copied()
 }

@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    Candidate, Channel, Clock, Covariate, Dynamics, Law, Mechanism, Observation, Parameter, Plant, Recording, Seed,
-    Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+    About, Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant,
+    Recording, Scene, Seed, Signs, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
 };
 
 /// The mechanisms a domain knows: one row each.
@@ -32,6 +32,10 @@ pub struct Assembly<P: Plant> {
     parts: Vec<Part<P>>,
     parameters: Vec<Parameter>,
     excluded: Vec<String>,
+    /// Longest step of integration [s], where it is not the plant's own.
+    step: Option<f64>,
+    /// Whether what is random stays out of rollouts.
+    quiet: bool,
 }
 
 impl<P: Plant> fmt::Debug for Assembly<P> {
@@ -44,7 +48,15 @@ impl<P: Plant> Assembly<P> {
     /// A plant with no mechanisms yet, which may be given those of `registry`.
     #[must_use]
     pub fn new(plant: P, registry: Registry<P>) -> Self {
-        Self { parameters: plant.parameters(), plant: Arc::new(plant), registry, parts: Vec::new(), excluded: Vec::new() }
+        Self {
+            parameters: plant.parameters(),
+            plant: Arc::new(plant),
+            registry,
+            parts: Vec::new(),
+            excluded: Vec::new(),
+            step: None,
+            quiet: false,
+        }
     }
 
     /// The plant.
@@ -116,7 +128,8 @@ impl<P: Plant> Assembly<P> {
             let about = part.mechanism.about();
             let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
             let law = part.mechanism.law(part.form, &thetas.block(at, count), seed.child(about.name));
-            match about.site {
+            match part.mechanism.site(part.form) {
+                _ if self.quiet && !part.mechanism.followed(part.form) => {}
                 Site::Command => run.command_laws.push(law),
                 Site::Plant => run.plant_laws.push(law),
                 Site::Observation => run.observation_laws.push(law),
@@ -181,7 +194,9 @@ impl<P: Plant> Run<P> {
         self.inputs.extend(self.commands.iter().map(input));
         self.effects.fill(P::Effect::default());
         for (k, law) in self.plant_laws.iter_mut().enumerate() {
-            law.act(tick, &self.states, &self.inputs, &self.commands, &mut self.effects);
+            let scene =
+                Scene { dynamics: &self.dynamics, states: &self.states, inputs: &self.inputs, commands: &self.commands };
+            law.act(tick, &scene, &mut self.effects);
             seen(k, &self.effects);
         }
         self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
@@ -194,6 +209,13 @@ impl<P: Plant> Run<P> {
             law.sense(time, &mut self.observations);
         }
         &self.observations
+    }
+
+    /// Puts all lanes where the first is; what laws remember stays theirs.
+    pub fn rejoin(&mut self) {
+        if let Some((first, others)) = self.states.split_first_mut() {
+            others.iter_mut().for_each(|state| state.clone_from(first));
+        }
     }
 
     /// The states, one a lane.
@@ -219,7 +241,11 @@ impl<P: Plant> Simulator for Assembly<P> {
     }
 
     fn clock(&self) -> Clock {
-        self.plant.clock()
+        match (self.plant.clock(), self.step) {
+            // A plant of no longest step is not integrated: it goes from row to row.
+            (Clock::Sampled { longest_step: own }, Some(longest_step)) if own.is_finite() => Clock::Sampled { longest_step },
+            (clock, _) => clock,
+        }
     }
 
     fn initial_parameters(&self, recording: &Recording<P::Stimulus>, row: usize) -> Vec<Parameter> {
@@ -249,41 +275,82 @@ impl<P: Plant> Simulator for Assembly<P> {
         rows: Range<usize>,
         seed: Seed,
     ) -> Vec<Trajectory> {
+        self.follow(thetas, recording, rows, None, seed)
+    }
+
+    fn rollout_rejoined(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<P::Stimulus>,
+        rows: Range<usize>,
+        every: usize,
+        seed: Seed,
+    ) -> Option<Vec<Trajectory>> {
+        Some(self.follow(thetas, recording, rows, Some(every.max(1)), seed))
+    }
+
+    fn commands(&self, recording: &Recording<P::Stimulus>) -> Option<Vec<f64>> {
+        recording.stimulus.commands().map(<[f64]>::to_vec)
+    }
+
+    fn excited(
+        &self,
+        recording: &Recording<P::Stimulus>,
+        time: Vec<f64>,
+        commands: Vec<f64>,
+    ) -> Option<Recording<P::Stimulus>> {
+        let lost = |m: &Measured| Measured { samples: vec![None; time.len()], ..m.clone() };
+        Some(Recording {
+            name: "next experiment".into(),
+            stimulus: recording.stimulus.commanded(commands)?,
+            measured: recording.measured.iter().map(lost).collect(),
+            time,
+        })
+    }
+}
+
+impl<P: Plant> Assembly<P> {
+    /// Follows `rows`; every `every` rows, if ever, all lanes go on from the state of the first.
+    fn follow(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<P::Stimulus>,
+        rows: Range<usize>,
+        every: Option<usize>,
+        seed: Seed,
+    ) -> Vec<Trajectory> {
         let own = self.parameters.len();
         let mut run = self.run(&thetas.block(0, own), &thetas.block(own, thetas.parameters() - own), seed);
-        let mut out = Follow::new(self.channels(), thetas.lanes(), rows.len());
+        let mut out = Follow::new(self.channels(), thetas.lanes(), rows.len(), every);
         match self.plant.clock() {
             Clock::Event => self.follow_events(&mut run, recording, rows, &mut out),
             Clock::Sampled { .. } => self.follow_samples(&mut run, recording, rows, &mut out),
         }
         out.trajectories
     }
-}
 
-/// How long before the first row followed the command laws see the commands already [s]: what is on its way then is not
-/// lost, whatever row a run starts from.
-const WARM_UP: f64 = 2.0;
-
-impl<P: Plant> Assembly<P> {
     /// Rows are samples: the observation of a row is taken before its command acts.
     fn follow_samples(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
-        let since = recording.time[rows.start] - WARM_UP;
+        // What is on its way when a run starts is not lost, whatever row it starts from.
+        let shaping = self.parts.iter().filter(|part| part.mechanism.site(part.form) == Site::Command);
+        let memory = shaping.map(|part| part.mechanism.memory()).fold(0.0, f64::max);
+        let since = recording.time[rows.start] - memory;
         let warm = recording.time[..rows.start].partition_point(|t| *t < since);
         for row in warm..rows.end {
             let time = recording.time[row];
             if row >= rows.start {
-                out.record(run.observe(time));
+                out.record(run, time);
             }
             if row + 1 == rows.end {
                 break;
             }
-            let command = recording.stimulus.command(row);
             let interval = recording.time[row + 1] - time;
-            let substeps = self.plant.clock().substeps(interval);
+            let substeps = self.clock().substeps(interval);
             let step = interval / substeps as f64;
             for sub in 0..substeps {
                 let tick = Tick { index: row, time: time + sub as f64 * step, step };
-                run.send(tick, &command);
+                let share = (sub as f64 + 0.5) / substeps as f64;
+                run.send(tick, &recording.stimulus.command_within(row, share));
                 if row >= rows.start {
                     run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
                 }
@@ -297,7 +364,7 @@ impl<P: Plant> Assembly<P> {
             let tick = Tick { index: row, time: recording.time[row], step: 0.0 };
             run.send(tick, &recording.stimulus.command(row));
             run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
-            out.record(run.observe(tick.time));
+            out.record(run, tick.time);
         }
     }
 }
@@ -305,24 +372,31 @@ impl<P: Plant> Assembly<P> {
 /// Collects observations, lane by lane and channel by channel.
 struct Follow {
     trajectories: Vec<Trajectory>,
+    /// Rows after which all lanes go on from the state of the first, if ever.
+    every: Option<usize>,
+    rows: usize,
 }
 
 impl Follow {
-    fn new(channels: &[Channel], lanes: usize, rows: usize) -> Self {
+    fn new(channels: &[Channel], lanes: usize, rows: usize, every: Option<usize>) -> Self {
         let one: Trajectory =
-            channels.iter().map(|c| Simulated { channel: c.name.to_owned(), samples: Vec::with_capacity(rows) }).collect();
+            channels.iter().map(|c| Simulated { channel: c.name.to_string(), samples: Vec::with_capacity(rows) }).collect();
         // A clone of an empty vector has no capacity: reserve in each lane.
         let mut trajectories = vec![one; lanes];
         trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
-        Self { trajectories }
+        Self { trajectories, every, rows: 0 }
     }
 
-    fn record<O: Observation>(&mut self, observations: &[O]) {
-        for (trajectory, observation) in self.trajectories.iter_mut().zip(observations) {
+    fn record<P: Plant>(&mut self, run: &mut Run<P>, time: f64) {
+        for (trajectory, observation) in self.trajectories.iter_mut().zip(run.observe(time)) {
             for (k, simulated) in trajectory.iter_mut().enumerate() {
                 simulated.samples.push(observation.channel(k));
             }
         }
+        if self.every.is_some_and(|every| self.rows.is_multiple_of(every)) {
+            run.rejoin();
+        }
+        self.rows += 1;
     }
 }
 
@@ -337,8 +411,10 @@ impl<P: Plant> Twin for Assembly<P> {
                 continue;
             }
             for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {
-                if recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus)) {
-                    candidates.push(Candidate { about, form, form_index });
+                let known = recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus));
+                if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
+                    let finishing = mechanism.finishing(form_index);
+                    candidates.push(Candidate { about, form, form_index, finishing });
                 }
             }
         }
@@ -354,6 +430,28 @@ impl<P: Plant> Twin for Assembly<P> {
             // A candidate of another registry has nothing to act on here.
             None => self.clone(),
         }
+    }
+
+    fn stepping(&self, seconds: f64) -> Self {
+        Self { step: Some(seconds), ..self.clone() }
+    }
+
+    fn quiet(&self) -> Self {
+        Self { quiet: true, ..self.clone() }
+    }
+
+    fn recognized(&self, signs: &Signs) -> Vec<Candidate> {
+        let modelled = self.modelled();
+        let unknown = |about: &About| !modelled.contains(&about.name) && !self.excluded.iter().any(|id| id == about.name);
+        let mut found = Vec::new();
+        for mechanism in self.registry.iter().filter(|m| unknown(&m.about())) {
+            for (form_index, mut form) in mechanism.forms(&Default::default()).into_iter().enumerate() {
+                let Some(values) = mechanism.recognized(form_index, signs) else { continue };
+                form.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.nominal = value);
+                found.push(Candidate { about: mechanism.about(), form, form_index, finishing: false });
+            }
+        }
+        found
     }
 
     fn modelled(&self) -> Vec<&'static str> {

@@ -3,7 +3,9 @@
 
 use std::fmt;
 
-use super::{Assembly, Mechanism, Parameter, Plant, Recording, Registry, Seed, Simulator, Thetas, Trajectory, Typical};
+use super::{
+    Assembly, Form, Mechanism, Parameter, Plant, Recording, Registry, Seed, Simulator, Thetas, Trajectory, Typical,
+};
 
 /// A broken line of a contract.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,7 +35,7 @@ pub fn check_plant<P: Plant>(plant: &P, registry: Registry<P>, recording: &Recor
     let lane = start(&assembly, recording, &[]);
     let alone = follow(&assembly, recording, std::slice::from_ref(&lane));
     let names: Vec<&str> = alone[0].iter().map(|s| s.channel.as_str()).collect();
-    if names != plant.channels().iter().map(|c| c.name).collect::<Vec<_>>() {
+    if names != plant.channels().iter().map(|c| c.name.as_ref()).collect::<Vec<_>>() {
         return fail(format!("channels are {names:?}"));
     }
     if alone[0].iter().any(|s| s.samples.len() != recording.len()) {
@@ -69,12 +71,15 @@ pub fn check_mechanism<P: Plant>(
     if plain.len() != forms.len() || forms.is_empty() {
         return fail(format!("{} forms, but {} for a recording", plain.len(), forms.len()));
     }
+    if let Some(form) = forms.iter().enumerate().find_map(|(k, form)| forms[..k].iter().find(|other| alike(form, other))) {
+        return fail(format!("the parameters of form `{}` are those of another: a twin could not say which", form.name));
+    }
     for (index, form) in forms.into_iter().enumerate() {
         check_parameters(about.name, &form.parameters)?;
         if form.parameters.len() != plain[index].parameters.len() {
             return fail(format!("form {index} changes its number of parameters with the recording"));
         }
-        if !mechanism.applies(index, plant, &recording.stimulus) {
+        if !plant.open_to(mechanism.site(index)) || !mechanism.applies(index, plant, &recording.stimulus) {
             continue;
         }
         let with = bare.clone().with_mechanism(mechanism, index, form.parameters.clone());
@@ -94,6 +99,12 @@ pub fn check_mechanism<P: Plant>(
         lanes_are_independent(about.name, &with, recording, &lane)?;
     }
     Ok(())
+}
+
+/// Whether two forms have parameters of the same names.
+fn alike(one: &Form, other: &Form) -> bool {
+    let has = |form: &Form, name: &str| form.parameters.iter().any(|p| p.name == name);
+    one.parameters.len() == other.parameters.len() && one.parameters.iter().all(|p| has(other, &p.name))
 }
 
 /// The values all parameters begin with: the plant's nominal, then `mechanism`, then the initial state's nominal.

@@ -7,7 +7,21 @@ mod actuator_lag;
 mod bias;
 mod command_delay;
 mod dead_zone;
+mod decay;
+mod drift;
+mod dropout;
+mod eccentricity;
+mod gain_error;
+mod noise;
+mod observation_delay;
+mod quantization;
+mod rate_limit;
+mod rectification;
 mod saturation;
+mod scale;
+mod thermal_derating;
+#[cfg(test)]
+mod wire;
 
 use std::fmt;
 
@@ -19,7 +33,18 @@ pub use actuator_lag::ActuatorLag;
 pub use bias::Bias;
 pub use command_delay::{CommandDelay, HeldLine};
 pub use dead_zone::DeadZone;
+pub use drift::Drift;
+pub use dropout::Dropout;
+pub use eccentricity::Eccentricity;
+pub use gain_error::GainError;
+pub use noise::Noise;
+pub use observation_delay::ObservationDelay;
+pub use quantization::Quantization;
+pub use rate_limit::RateLimit;
+pub use rectification::Rectification;
 pub use saturation::Saturation;
+pub use scale::Scale;
+pub use thermal_derating::ThermalDerating;
 
 /// Where a mechanism acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -41,6 +66,15 @@ impl fmt::Display for Site {
             Self::Observation => "observation",
         })
     }
+}
+
+/// What a measured channel shows of its sensor, whatever simulator it is held against.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Signs {
+    /// The part of the samples that repeat the one before to the last bit, where none should.
+    pub repeated: f64,
+    /// Mean number of repeats in a row.
+    pub run: f64,
 }
 
 /// One way to state a mechanism: a law and the parameters it has.
@@ -84,6 +118,7 @@ pub struct About {
 /// # Contract
 /// - At the nominal values of its parameters it changes no bit of the output.
 /// - At each start it changes something, on a plant that is moved enough.
+/// - No two of its forms have parameters of the same names: a twin tells by them which form it means.
 /// - Its law acts at its site only, and a lane's result never depends on the lanes beside it.
 ///
 /// [`check_mechanism`](super::check_mechanism) runs it.
@@ -97,8 +132,44 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn applies(&self, _form: usize, _plant: &P, _stimulus: &P::Stimulus) -> bool {
         true
     }
+    /// Where form `form` acts, where that is not where the mechanism is listed: play in a transmission may be told of the
+    /// command or of the motion.
+    fn site(&self, _form: usize) -> Site {
+        self.about().site
+    }
+    /// Whether following a recording can tell of form `form`. Noise cannot be followed, only recognized.
+    fn followed(&self, _form: usize) -> bool {
+        true
+    }
+    /// Whether form `form` only rounds what is reported: tried as it is once everything else is fitted, for what jumps has
+    /// no gradient to follow.
+    fn finishing(&self, _form: usize) -> bool {
+        false
+    }
+    /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.
+    fn recognized(&self, _form: usize, _signs: &Signs) -> Option<Vec<f64>> {
+        None
+    }
+    /// For how long what it did before matters to what it does [s]: a run that starts in the middle of a recording sees
+    /// the commands of as long a time before.
+    fn memory(&self) -> f64 {
+        1.0
+    }
     /// The running part of form `form` over the lanes of `thetas`, which holds that form's parameters and no others.
     fn law(&self, form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<P>>;
+}
+
+/// What a law meets inside the plant.
+#[derive(Debug)]
+pub struct Scene<'a, P: Plant> {
+    /// The running plant, which knows the parameters of every lane.
+    pub dynamics: &'a P::Dynamics,
+    /// States, one a lane.
+    pub states: &'a [P::State],
+    /// What the plant meets beside commands, one a lane.
+    pub inputs: &'a [P::Input],
+    /// Commands as they arrive, one a lane.
+    pub commands: &'a [P::Command],
 }
 
 /// The running part of a mechanism over all lanes, and the owner of its memory. It acts through one of its methods.
@@ -106,15 +177,7 @@ pub trait Law<P: Plant>: Send {
     /// Shapes the commands on their way to the plant, one a lane.
     fn shape(&mut self, _tick: Tick, _commands: &mut [P::Command]) {}
     /// Adds to what acts inside the plant, one effect a lane.
-    fn act(
-        &mut self,
-        _tick: Tick,
-        _states: &[P::State],
-        _inputs: &[P::Input],
-        _commands: &[P::Command],
-        _effects: &mut [P::Effect],
-    ) {
-    }
+    fn act(&mut self, _tick: Tick, _scene: &Scene<'_, P>, _effects: &mut [P::Effect]) {}
     /// Distorts the observations on their way back, one a lane.
     fn sense(&mut self, _time: f64, _observations: &mut [P::Observation]) {}
 }

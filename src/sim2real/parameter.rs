@@ -23,6 +23,9 @@ pub struct Parameter {
     pub starts: Vec<f64>,
     /// Whether the output is differentiable in it, to within the step of a finite difference.
     pub smooth: bool,
+    /// Whether its effect grows in proportion to it, from the nominal value on, where it is small: a screen then solves
+    /// for it instead of trying values.
+    pub linear: bool,
     /// Where the bounds come from.
     pub source: Cow<'static, str>,
 }
@@ -31,15 +34,22 @@ impl Parameter {
     /// A parameter with a flat prior over all reals.
     #[must_use]
     pub fn new(name: &'static str, unit: &'static str, nominal: f64) -> Self {
+        Self::named(name, unit, nominal)
+    }
+
+    /// The same of a name and a unit that are not known when the program is compiled.
+    #[must_use]
+    pub fn named(name: impl Into<Cow<'static, str>>, unit: impl Into<Cow<'static, str>>, nominal: f64) -> Self {
         Self {
-            name: Cow::Borrowed(name),
-            unit: Cow::Borrowed(unit),
+            name: name.into(),
+            unit: unit.into(),
             nominal,
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
             prior: None,
             starts: Vec::new(),
             smooth: true,
+            linear: false,
             source: Cow::Borrowed(""),
         }
     }
@@ -70,6 +80,13 @@ impl Parameter {
     #[must_use]
     pub fn stepped(mut self) -> Self {
         self.smooth = false;
+        self
+    }
+
+    /// Says that its effect grows in proportion to it, where it is small.
+    #[must_use]
+    pub fn proportional(mut self) -> Self {
+        self.linear = true;
         self
     }
 

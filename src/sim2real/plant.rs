@@ -1,6 +1,8 @@
 //! Known physics, with a place for what is not known.
 
-use super::{Parameter, Recording, Thetas, Tick};
+use std::borrow::Cow;
+
+use super::{Parameter, Recording, Site, Thetas, Tick};
 
 /// A named quantity, one value a row.
 pub type Covariate = (&'static str, Vec<f64>);
@@ -51,17 +53,40 @@ pub trait Observation: Clone + Default + Send + 'static {
 pub trait Stimulus<P: Plant>: Send + Sync {
     /// The command of row `row`, in force from its time on.
     fn command(&self, row: usize) -> P::Command;
+    /// The same during the part of the row about `share` of the way to the next: another where a signal does not hold.
+    fn command_within(&self, row: usize, _share: f64) -> P::Command {
+        self.command(row)
+    }
     /// What the plant meets in row `row`, given the command as it arrives.
     fn input(&self, row: usize, arriving: &P::Command) -> P::Input;
+    /// The commands, one a row, where a command is one number; none elsewhere.
+    fn commands(&self) -> Option<&[f64]> {
+        None
+    }
+    /// The same stimulus with other commands, where a command is one number: what an experiment would send.
+    fn commanded(&self, _commands: Vec<f64>) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
 }
 
 /// A channel a plant can be observed through.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Channel {
     /// Name, as written in a twin and a recording.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Unit.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
+}
+
+impl Channel {
+    /// A channel of that name and unit.
+    #[must_use]
+    pub const fn new(name: &'static str, unit: &'static str) -> Self {
+        Self { name: Cow::Borrowed(name), unit: Cow::Borrowed(unit) }
+    }
 }
 
 /// Known physics: a stateless description, from which [`Dynamics`] are made for the lanes of a run.
@@ -86,14 +111,14 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     /// Its running part.
     type Dynamics: Dynamics<Self>;
     /// What drives it while a recording is followed.
-    type Stimulus: Stimulus<Self> + Send + Sync;
+    type Stimulus: Stimulus<Self> + Clone + Send + Sync;
 
     /// Name, as a twin's `model`.
     fn name(&self) -> &'static str;
     /// What makes its clock tick.
     fn clock(&self) -> Clock;
     /// The channels it can be observed through, in the order of [`Observation::channel`].
-    fn channels(&self) -> &'static [Channel];
+    fn channels(&self) -> &[Channel];
     /// Its parameters, with the values it has today.
     fn parameters(&self) -> Vec<Parameter>;
     /// Typical sizes of what drives it and what is seen of it in `recordings`, by which fits choose where to begin.
@@ -111,6 +136,11 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     /// What was left out or is peculiar about `recording`, in words a report can show.
     fn notes(&self, _recording: &Recording<Self::Stimulus>) -> Vec<String> {
         Vec::new()
+    }
+    /// Whether mechanisms of that site have something to act on: equations that do not say what moves have no place for
+    /// friction.
+    fn open_to(&self, _site: Site) -> bool {
+        true
     }
     /// The unit a parameter has here, where mechanisms declare one in general terms.
     fn unit(&self, declared: &str) -> String {
@@ -148,12 +178,27 @@ pub struct Typical {
     pub output: f64,
     /// Of the first channel's rate of change [its unit/s].
     pub rate: f64,
+    /// Lowest and highest value of the first channel, in its unit.
+    pub range: [f64; 2],
+    /// Smallest step the first channel takes, in its unit; 0 where it takes none.
+    pub resolution: f64,
+    /// Duration of the longest recording [s].
+    pub duration: f64,
     /// The delay of commands that the recordings' own time stamps show [s], where they show it.
     pub delay: Option<f64>,
 }
 
 impl Default for Typical {
     fn default() -> Self {
-        Self { command: 1.0, effort: 1.0, output: 1.0, rate: 1.0, delay: None }
+        Self {
+            command: 1.0,
+            effort: 1.0,
+            output: 1.0,
+            rate: 1.0,
+            range: [-1.0, 1.0],
+            resolution: 0.01,
+            duration: 20.0,
+            delay: None,
+        }
     }
 }

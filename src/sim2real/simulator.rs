@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, Thetas, Trajectory};
+use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, Signs, Thetas, Trajectory};
 
 /// Something that follows a recording and says what it would have measured.
 ///
@@ -14,7 +14,7 @@ use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, 
 /// sample for each row followed; a lane's bits depend on neither the lanes beside it nor the thread.
 pub trait Simulator: Send + Sync {
     /// What drives it.
-    type Stimulus: Send + Sync;
+    type Stimulus: Clone + Send + Sync;
     /// Name.
     fn name(&self) -> String;
     /// The channels it simulates.
@@ -43,6 +43,32 @@ pub trait Simulator: Send + Sync {
         rows: Range<usize>,
         seed: Seed,
     ) -> Vec<Trajectory>;
+    /// As [`rollout`](Self::rollout), but every `every` rows all lanes go on from the state of the first: what parts them
+    /// then, they did since. None where states cannot be handed over.
+    fn rollout_rejoined(
+        &self,
+        _thetas: &Thetas,
+        _recording: &Recording<Self::Stimulus>,
+        _rows: Range<usize>,
+        _every: usize,
+        _seed: Seed,
+    ) -> Option<Vec<Trajectory>> {
+        None
+    }
+    /// The commands of a recording, one a row, where a command is one number; none elsewhere.
+    fn commands(&self, _recording: &Recording<Self::Stimulus>) -> Option<Vec<f64>> {
+        None
+    }
+    /// A recording yet to be made, of a system driven as that of `recording` is but by `commands`, each from its `time` [s]
+    /// on; nothing is measured in it. None where a command is not one number.
+    fn excited(
+        &self,
+        _recording: &Recording<Self::Stimulus>,
+        _time: Vec<f64>,
+        _commands: Vec<f64>,
+    ) -> Option<Recording<Self::Stimulus>> {
+        None
+    }
 }
 
 /// A mechanism a twin could be given: what diagnosis needs to know of it.
@@ -54,6 +80,8 @@ pub struct Candidate {
     pub form: Form,
     /// Number of that form.
     pub form_index: usize,
+    /// Whether it only rounds what is reported, and is tried as it is when everything else is fitted.
+    pub finishing: bool,
 }
 
 /// A simulator that can be given mechanisms it lacks.
@@ -63,6 +91,20 @@ pub trait Twin: Simulator + Clone {
     /// The twin with one more mechanism, whose parameters follow those it has.
     #[must_use]
     fn with(&self, candidate: &Candidate) -> Self;
+    /// The twin integrated in steps of at most `seconds` [s]; a twin that has no such choice stays as it is.
+    #[must_use]
+    fn stepping(&self, _seconds: f64) -> Self {
+        self.clone()
+    }
+    /// The twin as it is followed: without what is random, which no recording can be followed in.
+    #[must_use]
+    fn quiet(&self) -> Self {
+        self.clone()
+    }
+    /// The mechanisms that `signs` show by themselves, their parameters' nominal values as shown.
+    fn recognized(&self, _signs: &Signs) -> Vec<Candidate> {
+        Vec::new()
+    }
     /// Ids of the mechanisms it models.
     fn modelled(&self) -> Vec<&'static str>;
 }

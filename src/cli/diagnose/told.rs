@@ -5,7 +5,9 @@ use std::cmp::Ordering;
 use comfy_table::Table;
 
 use crate::cli::screen::{Screen, titled};
-use crate::report::quantity::{UNDEFINED, axis, decimals, number, percent, percents, uncertain, with_unit};
+use crate::report::quantity::{
+    UNDEFINED, axis, decimals, number, percent, percents, range, significant, uncertain, with_unit,
+};
 use crate::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, Score};
 
 /// Mechanisms of each stage that the ranking tells.
@@ -21,6 +23,10 @@ pub(super) fn diagnosis(screen: &Screen, diagnosis: &Diagnosis) -> String {
     let mut text = format!("{}\n", headline(screen, diagnosis));
     if !diagnosis.effects.is_empty() {
         text += &titled("What is missing", &effects(screen, &diagnosis.effects));
+    }
+    let place = place(diagnosis);
+    if !place.is_empty() {
+        text += &format!("\nWhere the refitted twin errs, before anything is named\n\n{place}");
     }
     text += &titled(&format!("Errors on held-out data ({})", diagnosis.held_out), &errors(screen, &diagnosis.fit));
     if !diagnosis.parameters.is_empty() {
@@ -40,7 +46,7 @@ pub(in crate::cli) fn effect_names(diagnosis: &Diagnosis) -> String {
 }
 
 fn effects(screen: &Screen, effects: &[Effect]) -> Table {
-    let mut table = screen.table(["mechanism", "acts on", ">confidence", "parameters", "rivals"]);
+    let mut table = screen.table(["mechanism", "acts on", ">confidence", "parameters", "where it acted", "rivals"]);
     for effect in effects {
         let parameters: Vec<String> = effect
             .parameters
@@ -54,10 +60,34 @@ fn effects(screen: &Screen, effects: &[Effect]) -> Table {
             effect.site.to_string(),
             percent(effect.confidence),
             parameters.join("\n"),
+            effect.location.clone().unwrap_or_else(|| UNDEFINED.to_owned()),
             if rivals.is_empty() { "none".to_owned() } else { rivals.join("\n") },
         ]);
     }
     table
+}
+
+/// Stretches of time that are told.
+const STRETCHES: usize = 4;
+
+/// Since when, in which states and at which times the twin is off.
+fn place(diagnosis: &Diagnosis) -> String {
+    let location = &diagnosis.location;
+    let mut text = location.onset.map_or_else(String::new, |onset| format!("  from {} s on\n", significant(onset, 4)));
+    for bin in &location.against {
+        let share = format!("{} of the error in {} of the rows", percent(bin.share_of_error), percent(bin.share_of_rows));
+        text += &format!("  {}: {}: {share}\n", bin.channel, range(bin));
+    }
+    for stretch in location.intervals.iter().take(STRETCHES) {
+        let (start, end) = (significant(stretch.start, 4), significant(stretch.end, 4));
+        let share = percent(stretch.share_of_error);
+        text += &format!("  {}: {start} to {end} s of {}: {share} of the error\n", stretch.channel, stretch.recording);
+    }
+    let more = location.intervals.len().saturating_sub(STRETCHES);
+    if more > 0 {
+        text += &format!("  and {more} more stretches\n");
+    }
+    text
 }
 
 /// Errors of the three twins, two rows a channel.
@@ -141,6 +171,9 @@ fn checks(screen: &Screen, diagnosis: &Diagnosis) -> String {
     );
     if !checks.at_bound.is_empty() {
         text += &format!("  at a bound: {}\n", checks.at_bound.join(", "));
+    }
+    if !checks.not_excited.is_empty() {
+        text += &format!("{}\n", screen.wrapped("  not excited by these recordings: ", &checks.not_excited.join(", ")));
     }
     for note in &checks.notes {
         text += &format!("{}\n", screen.wrapped("  - ", note));

@@ -1,7 +1,7 @@
 //! The price of size: an order larger than the touch takes the levels behind it.
 
-use crate::market::{Execution, ExecutionEffect, InFlight, Met, OrderLog, Report};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::market::{Execution, ExecutionEffect, OrderLog};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `price = touch + side * fraction * |VWAP of the displayed levels up to the quantity - touch|`.
 ///
@@ -50,8 +50,10 @@ struct Walk {
 }
 
 impl Law<Execution> for Walk {
-    fn act(&mut self, _tick: Tick, _: &[Report], met: &[Met], orders: &[InFlight], effects: &mut [ExecutionEffect]) {
-        for (((effect, met), order), fraction) in effects.iter_mut().zip(met).zip(orders).zip(&self.fraction) {
+    fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
+        for (((effect, met), order), fraction) in
+            effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.fraction)
+        {
             let walk = met.book.walk(order.side, order.fillable(met.volume));
             effect.concession += fraction * walk.map_or(0.0, |walk| walk.beyond_touch);
         }

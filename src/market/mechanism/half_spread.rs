@@ -1,7 +1,7 @@
 //! The price of immediacy: an order that takes pays half the spread.
 
-use crate::market::{Execution, ExecutionEffect, InFlight, Met, OrderLog, Report};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::market::{Execution, ExecutionEffect, OrderLog};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `price = reference + side * fraction * (ask - bid) / 2`, or `reference + side * bps * mid / 1e4` where no quotes are
 /// known.
@@ -55,8 +55,8 @@ struct Concession {
 }
 
 impl Law<Execution> for Concession {
-    fn act(&mut self, _tick: Tick, _: &[Report], met: &[Met], orders: &[InFlight], effects: &mut [ExecutionEffect]) {
-        for (((effect, met), order), size) in effects.iter_mut().zip(met).zip(orders).zip(&self.size) {
+    fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
+        for (((effect, met), order), size) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.size) {
             effect.concession += size * if self.of_spread { met.book.half_spread() } else { order.mid * 1e-4 };
         }
     }

@@ -1,7 +1,7 @@
 //! Impact that grows with the square root of the size.
 
-use crate::market::{Execution, ExecutionEffect, InFlight, Met, OrderLog, Report};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::market::{Execution, ExecutionEffect, OrderLog};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `price = reference + side * bps * sqrt(Q / V) * mid / 1e4`, with Q the quantity filled and V the units
 /// traded on an average day; `bps` is `bps_at_full_participation`, the concession of an order as large as a day's
@@ -48,8 +48,8 @@ struct Impact {
 }
 
 impl Law<Execution> for Impact {
-    fn act(&mut self, _tick: Tick, _: &[Report], met: &[Met], orders: &[InFlight], effects: &mut [ExecutionEffect]) {
-        for (((effect, met), order), bps) in effects.iter_mut().zip(met).zip(orders).zip(&self.bps) {
+    fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
+        for (((effect, met), order), bps) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.bps) {
             effect.concession += bps * order.participation(met.volume).sqrt() * order.mid * 1e-4;
         }
     }

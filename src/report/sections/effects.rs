@@ -1,8 +1,8 @@
-//! What was found, its parameters and its rivals; and where model and recording part.
+//! What was found, its parameters and its rivals.
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{percent, significant, uncertain, with_unit};
+use crate::report::quantity::{percent, uncertain, with_unit};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::{Diagnosis, Effect};
 
@@ -20,34 +20,12 @@ impl Section for Effects<'_> {
     }
 
     fn render(&self) -> Result<String, ReportError> {
-        let location = &self.diagnosis.location;
         let rows: Vec<Value> = self.diagnosis.effects.iter().map(row).collect();
-        let intervals: Vec<Value> = location
-            .intervals
-            .iter()
-            .map(|i| {
-                context! {
-                    recording => &i.recording,
-                    channel => &i.channel,
-                    start => with_unit(&significant(i.start, 4), "s"),
-                    end => with_unit(&significant(i.end, 4), "s"),
-                    share => percent(i.share_of_error),
-                }
-            })
-            .collect();
-        if rows.is_empty() && intervals.is_empty() && location.onset.is_none() {
+        if rows.is_empty() {
             return Ok(String::new());
         }
-        fill(
-            "effects.html",
-            include_str!("../templates/effects.html"),
-            context! {
-                rows => rows,
-                intervals => intervals,
-                onset => location.onset.map(|t| with_unit(&significant(t, 4), "s")),
-                modelled => self.diagnosis.modelled.clone(),
-            },
-        )
+        let modelled = self.diagnosis.modelled.clone();
+        fill("effects.html", include_str!("../templates/effects.html"), context! { rows => rows, modelled => modelled })
     }
 }
 

@@ -1,7 +1,7 @@
 //! A load that never goes away: a tilted axis, a spring balancer, a cable's pull.
 
-use crate::robot::{Joint, JointEffect, JointState, Torque};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `torque += torque_0`.
 ///
@@ -9,7 +9,7 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas
 #[derive(Debug, Clone, Copy)]
 pub struct ConstantLoad;
 
-impl Mechanism<Joint> for ConstantLoad {
+impl<P: Mover> Mechanism<P> for ConstantLoad {
     fn about(&self) -> About {
         About {
             name: "constant_load",
@@ -24,18 +24,18 @@ impl Mechanism<Joint> for ConstantLoad {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.05, -0.05].map(|fraction| fraction * typical.effort);
-        Form::only(vec![Parameter::new("torque", "N m", 0.0).starting_at(&starts)])
+        Form::only(vec![Parameter::new("torque", "N m", 0.0).starting_at(&starts).proportional()])
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Joint>> {
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         Box::new(Load(thetas.row(0).to_vec()))
     }
 }
 
 struct Load(Vec<f64>);
 
-impl Law<Joint> for Load {
-    fn act(&mut self, _: Tick, _: &[JointState], _: &[()], _: &[Torque], effects: &mut [JointEffect]) {
-        effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| effect.torque += torque);
+impl<P: Mover> Law<P> for Load {
+    fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| P::push(effect).effort += torque);
     }
 }

@@ -1,16 +1,23 @@
 //! Dry friction: the same against slow motion as against fast, and enough to hold the joint where it is.
 
-use crate::robot::{Joint, JointEffect, JointState, Torque};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-torque sign(v)` in motion; at rest, whatever holds the joint, up to `torque`.
 ///
+/// In the form `creeping`, it creeps while it holds, as contacts of rigid-body engines do
+/// ([`Push::creeping_friction`](crate::robot::Push)); in the form `smooth` it is `-smooth_torque tanh(v / velocity)` and holds
+/// nothing.
+///
 /// Source: Coulomb, *Théorie des machines simples* (1785); Armstrong-Hélouvry, Dupont & Canudas de Wit, "A survey of
-/// models, analysis tools and compensation methods for the control of machines with friction", Automatica 30 (1994).
+/// models, analysis tools and compensation methods for the control of machines with friction", Automatica 30 (1994);
+/// creeping: Todorov, "Convex and analytically invertible dynamics with contacts and constraints", ICRA 2014; smooth:
+/// Andersson, Söderberg & Björklund, "Friction models for sliding dry, boundary and mixed lubricated contacts", Tribology
+/// International 40 (2007).
 #[derive(Debug, Clone, Copy)]
 pub struct CoulombFriction;
 
-impl Mechanism<Joint> for CoulombFriction {
+impl<P: Mover> Mechanism<P> for CoulombFriction {
     fn about(&self) -> About {
         About {
             name: "coulomb_friction",
@@ -25,26 +32,79 @@ impl Mechanism<Joint> for CoulombFriction {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.03, 0.15, 0.4].map(|fraction| fraction * typical.effort);
-        Form::only(vec![Parameter::new("torque", "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)])
+        let torque = |name| Parameter::new(name, "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&starts);
+        let rate = typical.rate.max(1e-9);
+        let velocity = Parameter::new("velocity", "rad/s", rate)
+            .within(1e-4 * rate.min(1.0), f64::INFINITY)
+            .starting_at(&[0.02, 0.2].map(|fraction| fraction * rate));
+        vec![
+            Form { name: "dry", parameters: vec![torque("torque")] },
+            Form { name: "creeping", parameters: vec![torque("creeping_torque")] },
+            Form { name: "smooth", parameters: vec![torque("smooth_torque"), velocity] },
+        ]
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Joint>> {
-        Box::new(Friction(thetas.row(0).to_vec()))
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let torque = thetas.row(0).to_vec();
+        match form {
+            0 => Box::new(Dry(torque)),
+            1 => Box::new(Creeping(torque)),
+            _ => Box::new(Smooth { torque, velocity: thetas.row(1).to_vec() }),
+        }
     }
 }
 
-struct Friction(Vec<f64>);
+struct Dry(Vec<f64>);
 
-impl Law<Joint> for Friction {
-    fn act(&mut self, _: Tick, _: &[JointState], _: &[()], _: &[Torque], effects: &mut [JointEffect]) {
-        effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| effect.dry_friction += torque);
+impl<P: Mover> Law<P> for Dry {
+    fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| P::push(effect).dry_friction += torque);
+    }
+}
+
+struct Creeping(Vec<f64>);
+
+impl<P: Mover> Law<P> for Creeping {
+    fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| P::push(effect).creeping_friction += torque);
+    }
+}
+
+struct Smooth {
+    torque: Vec<f64>,
+    velocity: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for Smooth {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let parameters = self.torque.iter().zip(&self.velocity);
+        let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();
+        for (lane, ((effect, state), (torque, scale))) in lanes {
+            let velocity = P::motion(state).velocity;
+            let level = (velocity / scale).tanh();
+            let (friction, tangent) = (torque * level, torque / scale * (1.0 - level * level));
+            // Along the tangent the friction is that of the middle of the step, to second order; along the line to the
+            // origin no step can overshoot rest. So the one in fast motion and the other in slow.
+            let within = tick.step * friction.abs();
+            let fast = (velocity.abs() * P::inertia(scene.dynamics, lane, state) - within).clamp(0.0, within);
+            let slope = if fast < within {
+                let chord = if velocity == 0.0 { tangent } else { friction / velocity };
+                chord + (tangent - chord) * fast / within
+            } else {
+                tangent
+            };
+            let push = P::push(effect);
+            push.damping += slope;
+            push.effort -= friction - slope * velocity;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{Axis, Commands, MECHANISMS};
+    use crate::robot::mechanism::trial::Trial;
+    use crate::robot::{Axis, Commands, Joint, MECHANISMS};
     use crate::sim2real::{Assembly, Recording, Seed, Simulator};
 
     /// A push below the friction torque moves nothing, however long it lasts; one above does, and when it ends the joint
@@ -64,12 +124,37 @@ mod tests {
         let recording =
             Recording { name: "push".into(), stimulus: Commands(time.iter().map(push).collect()), measured: vec![], time };
         let arm = Joint::new(Axis::Rotary, [0.11, 0.05, 0.0, 1.0], [0.0; 4]);
-        let form = CoulombFriction.forms(&Typical::default())[0].parameters.clone();
+        let form = Mechanism::<Joint>::forms(&CoulombFriction, &Typical::default())[0].parameters.clone();
         let stuck = Assembly::new(arm, MECHANISMS).with_mechanism(&CoulombFriction, 0, form);
         let thetas = Thetas::single(&[0.11, 0.05, 0.0, 1.0, 0.2, 0.3, 0.0]);
         let position = &stuck.rollout(&thetas, &recording, 0..3_000, Seed(0))[0][0].samples;
         assert!(position[..1_000].iter().all(|q| *q == 0.3));
         assert!(position[1_500] > 0.4);
         assert_eq!(position[2_900], position[2_999]);
+    }
+
+    /// In free motion every form takes what friction takes: `torque` a radian.
+    #[test]
+    fn energy_is_lost_by_torque_times_way() {
+        let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.0, velocity: 3.0, step: 1e-3 };
+        for (form, values) in [(0, vec![0.2]), (1, vec![0.2]), (2, vec![0.2, 0.01])] {
+            let motion = trial.follow(&CoulombFriction, form, &values, &[0.0; 1_001]);
+            let lost = 0.05 * (9.0 - motion[1_000].velocity.powi(2));
+            assert!((lost / motion[1_000].position / 0.2 - 1.0).abs() < 1e-3, "form {form}");
+        }
+    }
+
+    /// What creeps while it holds a push below its torque settles at the velocity of `clip(share (inertia rate v + push))`,
+    /// and what is smooth at `velocity atanh(push / torque)`.
+    #[test]
+    fn what_does_not_hold_creeps_as_its_form_has_it() {
+        let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
+        let creep = 0.1 * (1.0 - 0.9) / (0.9 * 0.1 * 105.0);
+        for (form, values, expected) in
+            [(0, vec![0.2], 0.0), (1, vec![0.2], creep), (2, vec![0.2, 0.03], 0.03 * 0.5_f64.atanh())]
+        {
+            let motion = trial.follow(&CoulombFriction, form, &values, &[0.1; 3_000]);
+            assert!((motion[2_999].velocity - expected).abs() < 1e-6, "form {form}: {}", motion[2_999].velocity);
+        }
     }
 }

@@ -1,37 +1,113 @@
-//! What simulators of joints tend to leave out: one file each, one row each in [`MECHANISMS`].
+//! What simulators of robots tend to leave out: one file each, one row each in the registries of the plants they act on.
 
+mod backlash;
+mod cogging;
+mod compliance;
 mod constant_load;
 mod coulomb_friction;
+mod cubic_stiffness;
+mod end_stop;
+mod hysteresis;
+mod load_friction;
+mod overflow;
+mod payload_change;
 mod quadratic_drag;
+mod second_mass;
+mod spring;
 mod stiffness;
+mod stribeck_friction;
+#[cfg(test)]
+mod trial;
 
+pub use backlash::Backlash;
+pub use cogging::Cogging;
+pub use compliance::Compliance;
 pub use constant_load::ConstantLoad;
 pub use coulomb_friction::CoulombFriction;
+pub use cubic_stiffness::CubicStiffness;
+pub use end_stop::EndStop;
+pub use hysteresis::Hysteresis;
+pub use load_friction::LoadFriction;
+pub use overflow::Overflow;
+pub use payload_change::PayloadChange;
 pub use quadratic_drag::QuadraticDrag;
 pub use stiffness::Stiffness;
+pub use stribeck_friction::StribeckFriction;
 
-use super::Joint;
+use super::{CartPole, Equations, Joint, Tanks};
 use crate::sim2real::Registry;
-use crate::sim2real::mechanism::{ActuatorLag, Bias, CommandDelay, DeadZone, Saturation};
+use crate::sim2real::mechanism::{
+    ActuatorLag, Bias, CommandDelay, DeadZone, Drift, Dropout, Eccentricity, GainError, Noise, ObservationDelay,
+    Quantization, RateLimit, Rectification, Saturation, Scale, ThermalDerating,
+};
+
+/// The rows of a plant's registry: its delays, which of its channels are rates of others, and its own rows. The same generic
+/// rows stand in each, and Rust has no generic statics: written out, every new mechanism would have to be listed once a
+/// plant.
+macro_rules! rows {
+    // A plant with a coordinate that moves.
+    (motion, delays $delays:expr, rates $rates:expr) => {
+        rows!(
+            signals, delays $delays, rates $rates,
+            plant [
+                &Backlash, &ConstantLoad, &CoulombFriction, &StribeckFriction, &LoadFriction, &QuadraticDrag, &Stiffness,
+                &CubicStiffness, &Cogging, &PayloadChange, &EndStop, &Compliance, &Hysteresis
+            ],
+            sensor [&Rectification, &Eccentricity]
+        )
+    };
+    // Any plant whose commands and observations are signals.
+    (
+        signals, delays $delays:expr, rates $rates:expr, plant [$($own:expr),*], sensor [$($read:expr),*]
+    ) => {
+        &[
+            &CommandDelay { longest: $delays.0, starts: $delays.1, smooth: true },
+            &DeadZone,
+            &Saturation,
+            &ActuatorLag,
+            &RateLimit,
+            &ThermalDerating,
+            &GainError,
+            $($own,)*
+            &Bias,
+            &Drift,
+            &Scale,
+            &Quantization,
+            $($read,)*
+            &ObservationDelay { longest: $delays.0, starts: $delays.1, rates: $rates },
+            &Dropout,
+            &Noise,
+        ]
+    };
+}
+
+/// Longest delay [s], and where fits of delays begin [s].
+type Delays = (f64, &'static [f64]);
+/// Of what is sampled by the millisecond.
+const OF_SERVOS: Delays = (0.5, &[0.004, 0.02, 0.08]);
+/// Of what is sampled by the second.
+const OF_PROCESSES: Delays = (120.0, &[1.0, 4.0, 16.0]);
+
+/// Of what may be either.
+const OF_ANYTHING: Delays = (120.0, &[0.004, 0.02, 0.08, 1.0, 4.0]);
 
 /// The joint's registry.
-pub static MECHANISMS: Registry<Joint> = &[
-    &CommandDelay { longest: 0.5, starts: &[0.004, 0.02, 0.08], smooth: true },
-    &DeadZone,
-    &Saturation,
-    &ActuatorLag,
-    &ConstantLoad,
-    &CoulombFriction,
-    &QuadraticDrag,
-    &Stiffness,
-    &Bias,
-];
+pub static MECHANISMS: Registry<Joint> = rows!(motion, delays OF_SERVOS, rates &[(0, 1)]);
+
+/// The registry of a cart with a pole: mechanisms of motion act on the cart.
+pub static CART_POLE_MECHANISMS: Registry<CartPole> = rows!(motion, delays OF_SERVOS, rates &[(0, 1), (2, 3)]);
+
+/// The registry of two tanks: levels are not below 0, and no encoder turns with them.
+pub static TANKS_MECHANISMS: Registry<Tanks> = rows!(signals, delays OF_PROCESSES, rates &[], plant [&Overflow], sensor []);
+
+/// The registry of equations, which may be of anything; mechanisms of motion act where the equations say what moves.
+pub static EQUATIONS_MECHANISMS: Registry<Equations> = rows!(motion, delays OF_ANYTHING, rates &[]);
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::robot::{Axis, Commands};
-    use crate::sim2real::{Measured, Recording, check_mechanism};
+    use crate::sim2real::{Assembly, Measured, Mechanism, Recording, Seed, Simulator, Thetas, check_mechanism};
 
     #[test]
     fn every_row_keeps_the_contract() {
@@ -47,5 +123,30 @@ mod tests {
         for mechanism in MECHANISMS {
             check_mechanism(*mechanism, &arm, MECHANISMS, &recording).unwrap();
         }
+    }
+
+    #[test]
+    fn only_what_turns_can_be_eccentric() {
+        let applies = |axis| Eccentricity.applies(0, &Joint::new(axis, [1.0; 4], [0.0; 4]), &Commands::default());
+        assert!(applies(Axis::Rotary) && !applies(Axis::Linear));
+    }
+
+    /// A run that starts in the middle of a recording, from the state the whole had there, is as warm as the whole.
+    #[test]
+    fn heat_is_not_lost_between_windows() {
+        let time: Vec<f64> = (0..3_000).map(|i| f64::from(i) * 4e-3).collect();
+        let stimulus = Commands(time.iter().map(|t| 1.0 + (3.0 * t).sin()).collect());
+        let recording = Recording { name: "push".into(), stimulus, measured: vec![], time };
+        let plant = Joint::new(Axis::Rotary, [0.1, 0.5, 0.0, 1.0], [0.0; 4]);
+        let form = Mechanism::<Joint>::forms(&ThermalDerating, &Default::default())[0].parameters.clone();
+        let warm = Assembly::new(plant, MECHANISMS).with_mechanism(&ThermalDerating, 0, form);
+        let follow = |initial: [f64; 2], rows| {
+            let thetas = Thetas::single(&[0.1, 0.5, 0.0, 1.0, 0.02, 30.0, initial[0], initial[1]]);
+            warm.rollout(&thetas, &recording, rows, Seed(0)).remove(0)
+        };
+        let whole = follow([0.0, 0.0], 0..3_000);
+        let middle = follow([whole[0].samples[2_000], whole[1].samples[2_000]], 2_000..3_000);
+        let apart = middle[0].samples.iter().zip(&whole[0].samples[2_000..]).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) < 1e-9);
     }
 }

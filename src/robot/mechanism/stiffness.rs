@@ -1,21 +1,22 @@
 //! A spring towards position 0: a cable, a bellows, a return spring.
 
-use crate::robot::{Joint, JointEffect, JointState, Torque};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
-/// `-rate q`.
+/// `-rate q`; in the form `bent`, `-bent_rate q - third_rate q^3`: no spring is quite straight, and one that bends is one
+/// spring, not two.
 ///
 /// Source: Hooke, *De potentia restitutiva* (1678).
 #[derive(Debug, Clone, Copy)]
 pub struct Stiffness;
 
-impl Mechanism<Joint> for Stiffness {
+impl<P: Mover> Mechanism<P> for Stiffness {
     fn about(&self) -> About {
         About {
             name: "stiffness",
             site: Site::Plant,
             title: "a spring",
-            law: "inertia a = ... - rate q",
+            law: "inertia a = ... - rate q; bent: ... - bent_rate q - third_rate q^3",
             source: "Hooke, De potentia restitutiva (1678)",
             remedy: "look for a cable, hose or return spring; add its rate to the simulator",
             contains: &[],
@@ -24,18 +25,41 @@ impl Mechanism<Joint> for Stiffness {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.05, 0.3].map(|fraction| fraction * typical.effort / typical.output.max(1e-12));
-        Form::only(vec![Parameter::new("rate", "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)])
+        let rate =
+            |name| Parameter::new(name, "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts).proportional();
+        let thirds = [0.02, -0.02].map(|fraction| fraction * typical.effort / typical.output.powi(3).max(1e-12));
+        let third = Parameter::new("third_rate", "N m/rad^3", 0.0).starting_at(&thirds).proportional();
+        vec![
+            Form { name: "straight", parameters: vec![rate("rate")] },
+            Form { name: "bent", parameters: vec![rate("bent_rate"), third] },
+        ]
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Joint>> {
-        Box::new(Spring(thetas.row(0).to_vec()))
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let rates = thetas.row(0).to_vec();
+        if form == 0 { Box::new(Spring(rates)) } else { Box::new(BentSpring { rates, thirds: thetas.row(1).to_vec() }) }
+    }
+}
+
+struct BentSpring {
+    rates: Vec<f64>,
+    thirds: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for BentSpring {
+    fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let lanes = effects.iter_mut().zip(scene.states).zip(self.rates.iter().zip(&self.thirds));
+        for ((effect, state), (rate, third)) in lanes {
+            let position = P::motion(state).position;
+            P::push(effect).stiffness += rate + third * position * position;
+        }
     }
 }
 
 struct Spring(Vec<f64>);
 
-impl Law<Joint> for Spring {
-    fn act(&mut self, _: Tick, _: &[JointState], _: &[()], _: &[Torque], effects: &mut [JointEffect]) {
-        effects.iter_mut().zip(&self.0).for_each(|(effect, rate)| effect.stiffness += rate);
+impl<P: Mover> Law<P> for Spring {
+    fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        effects.iter_mut().zip(&self.0).for_each(|(effect, rate)| P::push(effect).stiffness += rate);
     }
 }

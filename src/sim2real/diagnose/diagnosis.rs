@@ -81,9 +81,38 @@ pub struct Effect {
     pub parameters: BTreeMap<String, Estimate>,
     /// What else it might be.
     pub rivals: Vec<Rival>,
-    /// When it acted, in words.
+    /// When it acted, in words: `|velocity| < 0.05 rad/s`, `from 12.4 s on`, `throughout`; none where nothing separates the
+    /// moments at which it did.
     #[serde(rename = "where")]
     pub location: Option<String>,
+    /// When it acted in the fitted recordings, where it acts at times only.
+    #[serde(default)]
+    pub active: Vec<Stretch>,
+    /// By how much it moved each channel there.
+    #[serde(default)]
+    pub moved: Vec<Moved>,
+}
+
+/// A stretch of time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stretch {
+    /// The recording it lies in.
+    pub recording: String,
+    /// Start [s].
+    pub start: f64,
+    /// End [s].
+    pub end: f64,
+}
+
+/// By how much a mechanism moved a channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Moved {
+    /// The channel.
+    pub channel: String,
+    /// Root mean square of what following the fitted recordings without it, all else equal, changes, in `unit`.
+    pub rms: f64,
+    /// The channel's unit.
+    pub unit: String,
 }
 
 /// A fitted value.
@@ -113,6 +142,28 @@ pub struct Where {
     pub intervals: Vec<Interval>,
     /// When it began [s], where it did not from the start.
     pub onset: Option<f64>,
+    /// The states that hold most of the error, the most telling first.
+    #[serde(default)]
+    pub against: Vec<Bin>,
+}
+
+/// A range of a state that holds more of a channel's error than of its rows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Bin {
+    /// The channel.
+    pub channel: String,
+    /// What it is a range of: `velocity`, `|velocity|`, `command`, `time`.
+    pub on: String,
+    /// Unit of that, as far as it has one.
+    pub unit: String,
+    /// Where the range begins, in `unit`; none where it has no lower end.
+    pub from: Option<f64>,
+    /// Where it ends, in `unit`; none where it has no upper end.
+    pub to: Option<f64>,
+    /// The part of the channel's squared error that lies within, from 0 to 1.
+    pub share_of_error: f64,
+    /// The part of the rows that does, from 0 to 1.
+    pub share_of_rows: f64,
 }
 
 /// A stretch of time in which a channel's error is large.
@@ -181,6 +232,10 @@ pub struct Checks {
     pub at_bound: Vec<String>,
     /// How many mechanisms were tried.
     pub tried: usize,
+    /// Ids of the mechanisms of which these recordings cannot tell: at no size that was tried would they have changed what
+    /// was measured by more than the noise.
+    #[serde(default)]
+    pub not_excited: Vec<String>,
     /// Further findings a reader should know, in words.
     pub notes: Vec<String>,
 }
@@ -190,6 +245,21 @@ pub struct Checks {
 pub struct NextExperiment {
     /// What to do, in one sentence.
     pub what: String,
+    /// File with the commands to send, beside this one; none where there is only advice.
+    #[serde(default)]
+    pub file: Option<String>,
+    /// Ids of the mechanisms it tells apart.
+    #[serde(default)]
+    pub rivals: Vec<String>,
+    /// What they would then differ by, whatever parameters the worse one is given: root mean square, in units of the noise.
+    #[serde(default)]
+    pub separation: Option<f64>,
+    /// The gain in log-likelihood to expect of the right one, `N / 2` times `separation` squared.
+    #[serde(default)]
+    pub gain: Option<f64>,
+    /// The same of the commands in the recordings at hand.
+    #[serde(default)]
+    pub gain_so_far: Option<f64>,
 }
 
 /// How one mechanism did in the stage in which it was tried.
@@ -205,8 +275,16 @@ pub struct Score {
     pub screen: f64,
     /// The part of its signature that refitting the other parameters could not hide, from 0 to 1.
     pub survival: f64,
+    /// Whether it would change what is measured by more than the noise, at the largest size that was tried.
+    #[serde(default = "yes")]
+    pub excited: bool,
     /// `N_e ln(RSS0 / RSS1) - k ln N_e`; none where it was screened out.
     pub gain: Option<f64>,
     /// Whether it was accepted in that stage.
     pub accepted: bool,
+}
+
+/// What is said of a score written before it was asked.
+fn yes() -> bool {
+    true
 }

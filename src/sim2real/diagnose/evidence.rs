@@ -13,6 +13,9 @@ const REMEMBERED: f64 = 0.5;
 /// Windows in which an accumulating plant is followed, in time constants of the plant.
 const WINDOW: f64 = 2.0;
 
+/// Windows into which a recording is cut at the most: each has an initial state of its own to be paid for.
+const MOST_WINDOWS: f64 = 40.0;
+
 /// Rows of each held-out recording, as a part of it, from which its initial state is estimated.
 const SETTLING: f64 = 0.1;
 
@@ -65,6 +68,19 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
             None => free_run.clone(),
         };
         Self { free_run, compared, held_out: apart, how, weights, rounding, window }
+    }
+
+    /// The same evidence, in which hypotheses are compared in free run whatever the plant is.
+    pub(super) fn in_free_run(&self) -> Self {
+        Self {
+            free_run: self.free_run.clone(),
+            compared: self.free_run.clone(),
+            held_out: self.held_out.clone(),
+            how: self.how.clone(),
+            weights: self.weights.clone(),
+            rounding: self.rounding.clone(),
+            window: None,
+        }
     }
 
     /// Variance of the rounding of `channel`, in units of its noise.
@@ -134,5 +150,6 @@ fn window<S: Simulator>(simulator: &S, parts: &[Part<'_, S::Stimulus>]) -> Optio
     let reach = distance(initial.len(), last) * (1.0 - (-1.0_f64).exp());
     let row = (0..=last).find(|row| distance(initial.len(), *row) >= reach)?;
     let constant = time[row] - time[0];
-    Some((WINDOW * constant).max(20.0 * (time[last] - time[0]) / last.max(1) as f64))
+    let duration = time[last] - time[0];
+    Some((WINDOW * constant).max(20.0 * duration / last.max(1) as f64).max(duration / MOST_WINDOWS))
 }

@@ -1,12 +1,10 @@
 //! A hypothesis: the twin with some mechanisms added, fitted as well as it goes.
 
-use rayon::prelude::*;
-
 use super::evidence::Evidence;
 use super::screen::{Screened, signatures};
 use super::whiteness::{ChannelMisfit, channel_misfits};
-use crate::sim2real::identify::{Block, Fit, Problem, State, fit};
-use crate::sim2real::{Candidate, Part, Seed, Twin};
+use crate::sim2real::identify::{Block, Effort, Fit, Problem, State, fit};
+use crate::sim2real::{Candidate, Parameter, Part, Seed, Twin};
 
 /// The twin with the mechanisms numbered in `added`, and its fit.
 #[derive(Debug, Clone)]
@@ -43,23 +41,22 @@ pub(super) struct Inquiry<'a, T: Twin> {
     pub seed: Seed,
 }
 
-/// How many of a candidate's starts are followed to their end.
-const STARTS: usize = 2;
+/// How many of a candidate's starts are followed.
+const STARTS: usize = 4;
 
 impl<T: Twin> Inquiry<'_, T> {
     /// The twin as given, its own parameters refitted.
     pub fn recalibrated(&self) -> Hypothesis<T> {
         let start: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
-        self.fitted(self.twin.clone(), Vec::new(), &[start], None)
+        self.fitted(self.twin.clone(), Vec::new(), &[start], None, Effort::Thorough)
     }
 
     /// `parent` with candidate `number` added, fitted from the starts that screening liked best.
-    pub fn extended(&self, parent: &Hypothesis<T>, number: usize, screened: &Screened) -> Hypothesis<T> {
+    pub fn extended(&self, parent: &Hypothesis<T>, number: usize, screened: &Screened, effort: Effort) -> Hypothesis<T> {
         let twin = parent.twin.with(&self.candidates[number]);
-        let starts: Vec<Vec<f64>> =
-            screened.starts.iter().take(STARTS).map(|s| parent.fit.values.iter().chain(s).copied().collect()).collect();
+        let starts = apart(&screened.starts, twin.parameters());
         let added = parent.added.iter().copied().chain([number]).collect();
-        self.fitted(twin, added, &starts, Some(&parent.fit.state))
+        self.fitted(twin, added, &starts, Some(&parent.fit.state), effort)
     }
 
     /// `whole` without the `position`-th of its mechanisms, refitted from the joint solution and from the twin as given.
@@ -80,21 +77,47 @@ impl<T: Twin> Inquiry<'_, T> {
             }
             at += count;
         }
-        self.fitted(twin, added, &[joint, given], Some(&whole.fit.state))
+        self.fitted(twin, added, &[joint, given], Some(&whole.fit.state), Effort::Thorough)
+    }
+
+    /// `parent` with candidate `number` added at its nominal values, and nothing fitted anew.
+    pub fn as_it_is(&self, parent: &Hypothesis<T>, number: usize) -> Hypothesis<T> {
+        let twin = parent.twin.with(&self.candidates[number]);
+        let problem = self.problem(&twin, &self.evidence.compared);
+        let mut fit = parent.fit.clone();
+        fit.values.extend(self.candidates[number].form.parameters.iter().map(|p| p.nominal));
+        fit.std.resize(fit.values.len(), 0.0);
+        fit.residual = problem.evaluate(&fit.values, &fit.state, &[]).residual;
+        let blocks = problem.blocks();
+        let added = parent.added.iter().copied().chain([number]).collect();
+        self.weighed(twin, added, fit, &blocks)
+    }
+
+    /// `hypothesis` refitted with this inquiry's step of integration, from where it stands.
+    pub fn refitted(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
+        let twin = hypothesis.added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]));
+        self.fitted(
+            twin,
+            hypothesis.added.clone(),
+            std::slice::from_ref(&hypothesis.fit.values),
+            Some(&hypothesis.fit.state),
+            Effort::Thorough,
+        )
     }
 
     /// The best fit of `twin` from several starts.
-    fn fitted(&self, twin: T, added: Vec<usize>, starts: &[Vec<f64>], state: Option<&State>) -> Hypothesis<T> {
+    fn fitted(
+        &self,
+        twin: T,
+        added: Vec<usize>,
+        starts: &[Vec<f64>],
+        state: Option<&State>,
+        effort: Effort,
+    ) -> Hypothesis<T> {
         let problem = self.problem(&twin, &self.evidence.compared);
         let estimated = self.evidence.initial_state(&problem);
-        let state = state.unwrap_or(&estimated);
-        let free = free_parameters(&twin);
-        let fits: Vec<Fit> = starts.par_iter().map(|start| fit(&problem, start, &free, state)).collect();
+        let best = fit(&problem, starts, &free_parameters(&twin), state.unwrap_or(&estimated), effort);
         let blocks = problem.blocks();
-        let Some(best) = fits.into_iter().min_by(|a, b| measured(a, &blocks).total_cmp(&measured(b, &blocks))) else {
-            let fit = fit(&problem, &nominal(&twin), &free, state);
-            return self.weighed(twin, added, fit, &blocks);
-        };
         self.weighed(twin, added, best, &blocks)
     }
 
@@ -109,7 +132,8 @@ impl<T: Twin> Inquiry<'_, T> {
             return hypothesis.fit.clone();
         }
         let problem = self.problem(&hypothesis.twin, &self.evidence.free_run);
-        fit(&problem, &hypothesis.fit.values, &hypothesis.fit.free, &State::estimated(&problem))
+        let start = std::slice::from_ref(&hypothesis.fit.values);
+        fit(&problem, start, &hypothesis.fit.free, &State::estimated(&problem), Effort::Thorough)
     }
 
     /// The problem of fitting `twin` to `parts`.
@@ -128,12 +152,19 @@ pub(super) fn free_parameters<T: Twin>(twin: &T) -> Vec<usize> {
     twin.parameters().iter().enumerate().filter(|(_, p)| !p.frozen()).map(|(k, _)| k).collect()
 }
 
-fn nominal<T: Twin>(twin: &T) -> Vec<f64> {
-    twin.parameters().iter().map(|p| p.nominal).collect()
-}
-
-/// Sum of squares of the measured residuals alone.
-fn measured(fit: &Fit, blocks: &[Block]) -> f64 {
-    let rows = blocks.last().map_or(0, |b| b.range.end);
-    fit.residual.rows(0, rows).norm_squared()
+/// The first starts that differ from those before them by more than a fit makes up for in a step or two.
+fn apart(starts: &[Vec<f64>], parameters: &[Parameter]) -> Vec<Vec<f64>> {
+    let mut kept: Vec<Vec<f64>> = Vec::new();
+    for start in starts {
+        let near = |other: &Vec<f64>| {
+            start.iter().zip(other).zip(parameters).all(|((a, b), p)| {
+                let size = (a - p.nominal).abs().max((b - p.nominal).abs());
+                (a - b).abs() <= 0.3 * if size.is_finite() { size } else { b.abs() }
+            })
+        };
+        if kept.len() < STARTS && !kept.iter().any(near) {
+            kept.push(start.clone());
+        }
+    }
+    kept
 }

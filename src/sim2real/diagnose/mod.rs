@@ -3,15 +3,23 @@
 //! One file a step, in this order: `evidence` divides the recordings and finds their `noise`; a `hypothesis` is the
 //! twin with mechanisms added, and the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
 //! by their signatures; `select` fits and compares sets of them, by the evidence that `whiteness` counts; `rivals`
-//! looks for other names; `structure` asks what is left; `prove` measures errors on what was held out; `locate`
-//! says where; `verdict` weighs it all, and `words` tells it.
+//! looks for other names; `structure` asks what is left; `prove` measures errors on what was held out; `verdict` weighs it
+//! all, and `words` tells it. `locate` and `onset` say where and since when the twin is off, `activity` when what was named
+//! acted, and `experiment` designs, from the commands of `excitation`, what to record where rivals are left.
 
+mod activity;
 mod diagnosis;
 mod evidence;
+mod excitation;
+mod experiment;
+mod gates;
 mod hypothesis;
 mod locate;
 mod noise;
+mod onset;
+mod profile;
 mod prove;
+mod recognize;
 mod rivals;
 mod screen;
 mod select;
@@ -21,15 +29,20 @@ mod whiteness;
 mod words;
 
 pub use diagnosis::{
-    ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Score,
-    Verdict, Where,
+    Bin, ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment, ParameterChange, Rival, SCHEMA,
+    Score, Stretch, Verdict, Where,
 };
 pub use evidence::{Evidence, HELD_OUT};
+pub use excitation::Excitation;
+pub use experiment::EXPERIMENT_FILE;
 pub use hypothesis::Hypothesis;
 pub use noise::channel_weights;
+pub use profile::Profile;
 
 use hypothesis::Inquiry;
 use prove::Contest;
+use rivals::Place;
+use select::Selection;
 
 use super::identify::Fit;
 use super::{Clock, Recording, Seed, Twin};
@@ -75,6 +88,10 @@ pub struct Outcome<T> {
     pub std: Vec<f64>,
     /// Measurements beside the three twins.
     pub comparisons: Vec<Comparison>,
+    /// Errors over the states they may depend on.
+    pub profiles: Vec<Profile>,
+    /// The commands of the next experiment, where one was designed.
+    pub excitation: Option<Excitation>,
 }
 
 /// A twin refitted, with nothing added.
@@ -104,14 +121,45 @@ pub fn diagnose<T: Twin>(
     seed: Seed,
     progress: Progress<'_>,
 ) -> Outcome<T> {
+    let signs = recognize::signs(twin, recordings);
+    let found = Found { signs, of: twin.recognized(&signs) };
+    let quiet = twin.quiet();
+    if found.of.is_empty() {
+        return followed(&quiet, recordings, held_out, &found, seed, progress);
+    }
+    let channel = twin.channels().first().map(|c| c.name.clone()).unwrap_or_default();
+    let cleaned = [recordings, held_out].map(|all| recognize::without_repeats(all, &channel));
+    followed(&quiet, &cleaned[0], &cleaned[1], &found, seed, progress)
+}
+
+/// What the recordings show by themselves.
+pub(super) struct Found {
+    signs: super::Signs,
+    of: Vec<super::Candidate>,
+}
+
+/// The same of a twin that is followed, beside what was found without following it.
+fn followed<T: Twin>(
+    twin: &T,
+    recordings: &[Recording<T::Stimulus>],
+    held_out: &[Recording<T::Stimulus>],
+    found: &Found,
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Outcome<T> {
     progress("dividing the recordings", 0, 1);
     let evidence = Evidence::divide(twin, recordings, held_out);
-    let candidates = twin.candidates(recordings);
-    let inquiry = Inquiry { twin, candidates: &candidates, evidence: &evidence, seed };
-    let selection = select::select(&inquiry, progress);
-    progress("looking for rivals", 0, 1);
-    let (mut selection, rivals) = rivals::settled(&inquiry, selection);
+    let candidates = recognize::fixed(twin.candidates(recordings));
+    // Where a plant adds up errors, a free run tells most if the physics is complete, and hardly anything if it is not.
+    let free_run = evidence.in_free_run();
+    let mut inquiry = Inquiry { twin, candidates: &candidates, evidence: &free_run, seed };
+    let (mut selection, mut rivals) = selected(&inquiry, progress);
+    if evidence.window.is_some() && !selection.complete() {
+        inquiry = Inquiry { evidence: &evidence, ..inquiry };
+        (selection, rivals) = selected(&inquiry, progress);
+    }
     selection.mark_accepted(&candidates);
+    let selection = recognize::finished(&inquiry, selection, &mut rivals);
     progress("proving on held-out data", 0, 1);
     let recalibrated = inquiry.in_free_run(&selection.recalibrated);
     let trued = inquiry.in_free_run(&selection.selected);
@@ -121,19 +169,61 @@ pub fn diagnose<T: Twin>(
         recalibrated: (twin, &recalibrated.values),
         trued: (&selection.selected.twin, &trued.values),
     };
-    let comparisons = prove::compared(&contest, &evidence, seed);
+    let comparisons = prove::compared(&contest, inquiry.evidence, seed);
     let findings = verdict::Findings {
-        fits: prove::channel_fits(&comparisons, &evidence.weights, seed),
+        fits: prove::channel_fits(&comparisons, &inquiry.evidence.weights, seed),
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
         remainder: verdict::remainder(&inquiry, &selection),
         dependence: verdict::dependence(&inquiry, &selection.selected),
         foretold: verdict::foretold(&inquiry, &selection.selected),
-        intervals: locate::intervals(&comparisons),
         std: inflated(&inquiry, &selection.selected, &trued),
         trued: trued.clone(),
     };
-    let diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
-    Outcome { diagnosis, trued: selection.selected.twin, values: trued.values, std: findings.std, comparisons }
+    let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
+    verdict::recognized(&mut diagnosis, &inquiry, found);
+    progress("saying where", 0, 1);
+    let covariates = locate::covariates(&inquiry);
+    diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
+    let activities = activity::activities(&inquiry, &selection.selected, &trued, &covariates);
+    activity::tell(&mut diagnosis, &inquiry, &selection.selected, activities);
+    let profiles = profile::profiles(&inquiry, &selection.recalibrated, &selection.selected, &covariates);
+    progress("designing the next experiment", 0, 1);
+    let next = experiment::next(&inquiry, &selection, &rivals, diagnosis.verdict, &diagnosis.effects);
+    let excitation = next.and_then(|(next, excitation)| {
+        diagnosis.next_experiment = Some(next);
+        excitation
+    });
+    let (mut trued_twin, mut values, mut std) = (selection.selected.twin, trued.values, findings.std);
+    for candidate in &found.of {
+        trued_twin = trued_twin.with(candidate);
+        values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
+        std.resize(values.len(), 0.0);
+    }
+    Outcome { diagnosis, trued: trued_twin, values, std, comparisons, profiles, excitation }
+}
+
+/// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.
+fn selected<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> (Selection<T>, Vec<Place>) {
+    progress("refitting the twin's own parameters", 0, 1);
+    let given: Vec<f64> = inquiry.twin.parameters().iter().map(|p| p.nominal).collect();
+    if let Some(step) = gates::exploring_step(inquiry.twin, &given, inquiry.evidence) {
+        let twin = inquiry.twin.stepping(step);
+        let coarse = Inquiry { twin: &twin, ..*inquiry };
+        let selection = select::select(&coarse, coarse.recalibrated(), progress);
+        progress("looking for rivals", 0, 1);
+        let (selection, rivals) = rivals::settled(&coarse, selection);
+        let best = &selection.selected;
+        if gates::moved(&best.twin, &best.fit.values, inquiry.evidence, step, gates::own_step(inquiry.twin)) < gates::SETTLED
+        {
+            progress("fitting with the twin's own step", 0, 1);
+            let refitted = selection.refitted(inquiry);
+            let same = refitted.selected.added == selection.selected.added;
+            return if same { (refitted, rivals) } else { rivals::settled(inquiry, refitted) };
+        }
+    }
+    let selection = select::select(inquiry, inquiry.recalibrated(), progress);
+    progress("looking for rivals", 0, 1);
+    rivals::settled(inquiry, selection)
 }
 
 /// Refits the parameters that `twin` has, and adds nothing.

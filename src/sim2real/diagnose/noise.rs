@@ -13,10 +13,10 @@ pub fn channel_weights<S: Simulator>(simulator: &S, recordings: &[Recording<S::S
         .iter()
         .filter_map(|channel| {
             let measured: Vec<(&Recording<S::Stimulus>, &Measured)> =
-                recordings.iter().filter_map(|r| Some((r, r.channel(channel.name)?))).collect();
+                recordings.iter().filter_map(|r| Some((r, r.channel(&channel.name)?))).collect();
             // A channel that never moves says nothing of its noise, nor of anything else.
             let floors: Vec<f64> = measured.iter().map(|(r, m)| floor(simulator, r, m)).filter(|f| *f > 0.0).collect();
-            (!floors.is_empty()).then(|| ChannelWeight { channel: channel.name.to_owned(), noise: median(floors) })
+            (!floors.is_empty()).then(|| ChannelWeight { channel: channel.name.to_string(), noise: median(floors) })
         })
         .collect()
 }

@@ -3,11 +3,14 @@
 use rayon::prelude::*;
 
 use super::hypothesis::Inquiry;
-use super::select::{Selection, gain};
-use crate::sim2real::Twin;
+use super::select::{Selection, gain, lead};
+use crate::sim2real::identify::Effort;
+use crate::sim2real::{About, Twin};
 
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
+/// A rival that loses by more than this after a few steps is not followed further.
+const HOPELESS: f64 = 300.0;
 /// Other mechanisms fitted in the place of one.
 const TRIED: usize = 4;
 
@@ -54,14 +57,39 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
             let mut screened = inquiry.screened(less);
             screened.retain(|s| s.score > 0.0 && inquiry.candidates[s.number].about.name != name);
             screened.sort_by(|a, b| b.score.total_cmp(&a.score));
-            screened.truncate(TRIED);
+            let mut tried: Vec<&str> = Vec::new();
+            screened.retain(|s| {
+                let other = inquiry.candidates[s.number].about.name;
+                let new = tried.len() < TRIED && !tried.contains(&other);
+                tried.extend(new.then_some(other));
+                new
+            });
             let others: Vec<(usize, f64)> = screened
                 .par_iter()
-                .map(|s| (s.number, whole - gain(inquiry, less, &inquiry.extended(less, s.number, s))))
+                .map(|s| (s.number, inquiry.extended(less, s.number, s, Effort::Brief)))
+                .map(|(other, briefly)| match lead(inquiry, selected, &briefly) {
+                    loss if loss < HOPELESS => (other, lead(inquiry, selected, &inquiry.refitted(&briefly))),
+                    loss => (other, loss),
+                })
+                .map(|(other, loss)| {
+                    (other, loss - handicap(inquiry.candidates[*own].about, inquiry.candidates[other].about))
+                })
                 .collect();
             Place { gain: whole, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
         })
         .collect()
+}
+
+/// What a law that contains another must be better by to stand in its place: one more constant fits anything a little
+/// better.
+fn handicap(own: About, other: About) -> f64 {
+    if own.contains.contains(&other.name) {
+        WITHIN
+    } else if other.contains.contains(&own.name) {
+        -WITHIN
+    } else {
+        0.0
+    }
 }
 
 /// Probabilities of the selected mechanism and of each rival, from what they lose: the gain is twice the logarithm of a

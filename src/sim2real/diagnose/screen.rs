@@ -4,37 +4,64 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
-use crate::sim2real::identify::Block;
+use crate::sim2real::identify::{Block, State};
 use crate::sim2real::{Candidate, Twin};
+
+/// Points followed side by side: more gain no speed and cost memory.
+const LANES: usize = 48;
+/// Signatures shorter than this, in units of the noise and over all rows, are not excited: the recordings would look the
+/// same with and without the mechanism.
+const EXCITED: f64 = 3.0;
+
+/// A refit whose mean squared residual is this many times the noise may have been bent by what is missing.
+const BENT: f64 = 1.5;
 
 /// What screening found of one candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Screened {
     /// Number of the candidate.
     pub number: usize,
-    /// Correlation of its projected signature with the projected residual, at its best start; negative where it would
-    /// have to act the other way round.
+    /// Correlation of its projected signature with the projected residual, at its best start; 0 where it would have to act
+    /// the other way round.
     pub score: f64,
     /// The part of the signature that refitting the parent's parameters could not hide.
     pub survival: f64,
-    /// Its starts, the most promising first, each one value a parameter.
+    /// Whether its largest start would change what is measured by more than the noise.
+    pub excited: bool,
+    /// Where to begin, the most promising first: values of all parameters, the twin's own and its own.
     pub starts: Vec<Vec<f64>>,
+    /// Its projected signature at the best start, of length 1.
+    pub signature: DVector<f64>,
 }
 
 /// Screens every candidate that `parent` does not have.
+///
+/// A refit that had to do without a mechanism has been bent by it, sometimes out of all likeness: the twin with its
+/// parameters as given is looked at too, where nothing has been added yet.
 pub(super) fn signatures<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>) -> Vec<Screened> {
-    let blocks = inquiry.problem(&parent.twin, &inquiry.evidence.compared).blocks();
-    let ground = Ground::new(parent, &blocks);
+    let mut grounds = vec![Ground::new(inquiry, parent, &parent.fit.values)];
+    if parent.added.is_empty() && parent.misfits.iter().any(|m| m.sum_of_squares > BENT * m.count as f64) {
+        let given: Vec<f64> = parent.twin.parameters().iter().map(|p| p.nominal).collect();
+        grounds.push(Ground::new(inquiry, parent, &given));
+    }
     let has: Vec<&str> = parent.added.iter().map(|n| inquiry.candidates[*n].about.name).collect();
     (0..inquiry.candidates.len())
         .into_par_iter()
+        .filter(|number| !inquiry.candidates[*number].finishing)
         .filter(|number| !has.contains(&inquiry.candidates[*number].about.name))
-        .filter_map(|number| screen(inquiry, parent, number, &ground))
+        .filter_map(|number| screen(inquiry, parent, number, &grounds))
         .collect()
 }
 
 /// What a signature is compared with: the parent's residual, and the directions its parameters can move it in.
 struct Ground {
+    /// Values of the parent's parameters.
+    values: Vec<f64>,
+    /// What initial states explain, part by part.
+    basis: Vec<DMatrix<f64>>,
+    state: State,
+    /// The parent's residual with the initial states' share taken out.
+    followed: DVector<f64>,
     scale: DVector<f64>,
     hidden: DMatrix<f64>,
     residual: DVector<f64>,
@@ -42,89 +69,219 @@ struct Ground {
 
 impl Ground {
     /// Channels are brought to the same size first, so that a large misfit in one does not drown another.
-    fn new<T>(parent: &Hypothesis<T>, blocks: &[Block]) -> Self {
-        let rows = parent.fit.residual.len();
-        let mut scale = DVector::from_element(rows, 0.0);
-        for misfit in &parent.misfits {
-            let size = (misfit.sum_of_squares / misfit.count.max(1) as f64).sqrt();
-            for block in blocks.iter().filter(|b| b.channel == misfit.channel) {
-                scale.rows_mut(block.range.start, block.range.len()).fill(if size > 0.0 { 1.0 / size } else { 0.0 });
-            }
-        }
-        let mut jacobian = parent.fit.jacobian.clone();
+    fn new<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, values: &[f64]) -> Self {
+        let problem = inquiry.problem(&parent.twin, &inquiry.evidence.compared);
+        let blocks = problem.blocks();
+        let state = parent.fit.state.clone();
+        let evaluation = problem.evaluate(values, &state, &parent.fit.free);
+        let (rows, basis) = (evaluation.measured, evaluation.initial_basis);
+        let followed = problem.residuals(&[values.to_vec()], &state, &basis).pop();
+        let followed = followed.unwrap_or_else(|| DVector::zeros(rows));
+        let scale = scale(&followed, parent, &blocks);
+        let mut jacobian = evaluation.jacobian.rows(0, rows).into_owned();
         for mut column in jacobian.column_iter_mut() {
             column.component_mul_assign(&scale);
         }
         let hidden = orthonormal(jacobian);
-        let residual = without(&parent.fit.residual.component_mul(&scale), &hidden);
-        Self { scale, hidden, residual }
+        let residual = without(&followed.component_mul(&scale), &hidden);
+        Self { values: values.to_vec(), basis, state, followed, scale, hidden, residual }
     }
 }
 
-/// An orthonormal basis of the columns' span.
-fn orthonormal(columns: DMatrix<f64>) -> DMatrix<f64> {
-    // Of nothing there is no decomposition to ask for.
-    if columns.is_empty() {
-        return DMatrix::zeros(columns.nrows(), 0);
+fn scale<T>(residual: &DVector<f64>, parent: &Hypothesis<T>, blocks: &[Block]) -> DVector<f64> {
+    let mut scale = DVector::from_element(residual.len(), 0.0);
+    for misfit in &parent.misfits {
+        let own: Vec<&Block> = blocks.iter().filter(|b| b.channel == misfit.channel).collect();
+        let squares: f64 = own.iter().map(|b| residual.rows(b.range.start, b.range.len()).norm_squared()).sum();
+        let size = (squares / misfit.count.max(1) as f64).sqrt();
+        for block in own {
+            scale.rows_mut(block.range.start, block.range.len()).fill(if size > 0.0 { 1.0 / size } else { 0.0 });
+        }
     }
-    let svd = columns.svd(true, false);
-    let largest = svd.singular_values.max();
-    let kept: Vec<usize> = (0..svd.singular_values.len()).filter(|k| svd.singular_values[*k] > 1e-9 * largest).collect();
-    svd.u.map_or_else(|| DMatrix::zeros(0, 0), |u| u.select_columns(&kept))
+    scale
+}
+
+/// An orthonormal basis of the columns' span: Gram and Schmidt, twice, for columns may be nearly alike.
+fn orthonormal(columns: DMatrix<f64>) -> DMatrix<f64> {
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    for column in columns.column_iter() {
+        let length = column.norm();
+        if !(length > 0.0 && length.is_finite()) {
+            continue;
+        }
+        let mut left = column / length;
+        for _ in 0..2 {
+            for known in &basis {
+                left.axpy(-known.dot(&left), known, 1.0);
+            }
+        }
+        let rest = left.norm();
+        if rest > 1e-7 {
+            basis.push(left / rest);
+        }
+    }
+    if basis.is_empty() { DMatrix::zeros(columns.nrows(), 0) } else { DMatrix::from_columns(&basis) }
 }
 
 fn without(v: &DVector<f64>, basis: &DMatrix<f64>) -> DVector<f64> {
     if basis.ncols() == 0 { v.clone() } else { v - basis * basis.tr_mul(v) }
 }
 
-fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usize, ground: &Ground) -> Option<Screened> {
-    let candidate = &inquiry.candidates[number];
-    let twin = parent.twin.with(candidate);
-    let problem = inquiry.problem(&twin, &inquiry.evidence.compared);
-    let mut tried: Vec<(f64, f64, Vec<f64>)> = Vec::new();
-    for start in starts(candidate) {
-        let theta: Vec<f64> = parent.fit.values.iter().chain(&start).copied().collect();
-        let residual = problem.evaluate(&theta, &parent.fit.state, &[]).residual;
-        let signature = (&parent.fit.residual - residual).component_mul(&ground.scale);
-        let projected = without(&signature, &ground.hidden);
-        let (length, whole, misfit) = (projected.norm(), signature.norm(), ground.residual.norm());
-        if !(length > 0.0 && length.is_finite() && misfit > 0.0) {
-            continue;
-        }
-        let score = projected.dot(&ground.residual) / (length * misfit);
-        // How far along its signature the misfit reaches, as a factor on this start.
-        let reach = score * misfit / length;
-        tried.push((score, length / whole, start.clone()));
-        if let Some(scaled) = scaled(candidate, &start, reach) {
-            tried.push((score * 0.999, length / whole, scaled));
-        }
-    }
-    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let (score, survival) = tried.first().map(|(score, survival, _)| (*score, *survival))?;
-    let starts = tried.into_iter().map(|(_, _, start)| start).collect();
-    Some(Screened { number, score, survival, starts })
+/// A point of a candidate's parameters as screening saw it.
+struct Tried {
+    score: f64,
+    survival: f64,
+    start: Vec<f64>,
+    /// Of length 1.
+    signature: DVector<f64>,
+    /// The length it had.
+    length: f64,
 }
 
-/// All combinations of the starts of a candidate's parameters; before them, where there is one parameter, a tenth of the
-/// way to its first start: small enough to tell the direction in which its effect begins.
-fn starts(candidate: &Candidate) -> Vec<Vec<f64>> {
-    let all = candidate.form.parameters.iter().fold(vec![Vec::new()], |so_far, parameter| {
-        let own: Vec<f64> = if parameter.starts.is_empty() { vec![parameter.nominal] } else { parameter.starts.clone() };
-        so_far.iter().flat_map(|head| own.iter().map(move |v| head.iter().copied().chain([*v]).collect())).collect()
+fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usize, grounds: &[Ground]) -> Option<Screened> {
+    let candidate = &inquiry.candidates[number];
+    let trials = trials(candidate);
+    let twin = parent.twin.with(candidate);
+    let problem = inquiry.problem(&twin, &inquiry.evidence.compared);
+    let mut best: Option<Screened> = None;
+    let mut loudest = 0.0_f64;
+    let mut starts: Vec<(f64, Vec<f64>)> = Vec::new();
+    for ground in grounds {
+        let mut tried: Vec<Tried> = Vec::new();
+        for batch in trials.chunks((LANES / trials[0].len().max(1)).max(1)) {
+            let thetas: Vec<Vec<f64>> =
+                batch.iter().flatten().map(|point| ground.values.iter().chain(point).copied().collect()).collect();
+            let mut followed = problem.residuals(&thetas, &ground.state, &ground.basis).into_iter();
+            for points in batch {
+                let signatures: Vec<DVector<f64>> =
+                    followed.by_ref().take(points.len()).map(|residual| &ground.followed - residual).collect();
+                loudest = signatures.iter().map(|s| s.norm()).filter(|n| n.is_finite()).fold(loudest, f64::max);
+                tried.extend(explained(candidate, points, &signatures, ground));
+            }
+        }
+        tried.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let whole = |start: &[f64]| -> Vec<f64> { ground.values.iter().chain(start).copied().collect() };
+        if let Some(one) = tried.first().filter(|one| best.as_ref().is_none_or(|b| one.score > b.score)) {
+            let (score, survival, signature) = (one.score.max(0.0), one.survival, one.signature.clone());
+            best = Some(Screened { number, score, survival, excited: true, starts: Vec::new(), signature });
+        }
+        for one in &tried {
+            starts.extend(scaled(candidate, one, ground).map(|start| (one.score, whole(&start))));
+            starts.push((one.score, whole(&one.start)));
+        }
+    }
+    // Stable: of equal scores the refitted twin's come first.
+    starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let starts = starts.into_iter().map(|(_, start)| start).collect();
+    best.map(|best| Screened { excited: loudest > EXCITED, starts, ..best })
+}
+
+/// The points to follow: each entry holds one point, or, for a law with parameters it is proportional to, one point for
+/// each of these alone.
+fn trials(candidate: &Candidate) -> Vec<Vec<Vec<f64>>> {
+    let parameters = &candidate.form.parameters;
+    let own = |k: usize| -> Vec<f64> {
+        let p = &parameters[k];
+        if p.starts.is_empty() { vec![p.nominal] } else { p.starts.clone() }
+    };
+    let combined = (0..parameters.len()).fold(vec![Vec::new()], |so_far: Vec<Vec<f64>>, k| {
+        // Those that are solved for stay out of the way until it is their turn.
+        let values = if parameters[k].linear { vec![parameters[k].nominal] } else { own(k) };
+        so_far.iter().flat_map(|head| values.iter().map(move |v| head.iter().copied().chain([*v]).collect())).collect()
     });
-    let probe = match candidate.form.parameters.as_slice() {
+    let linear: Vec<usize> = (0..parameters.len()).filter(|k| parameters[*k].linear).collect();
+    if !linear.is_empty() {
+        let alone = |point: &Vec<f64>| -> Vec<Vec<f64>> {
+            let with = |k: &usize| {
+                let mut point = point.clone();
+                point[*k] = parameters[*k].starts.first().copied().unwrap_or(parameters[*k].nominal);
+                point
+            };
+            linear.iter().map(with).collect()
+        };
+        return combined.iter().map(alone).collect();
+    }
+    // A tenth of the way to a first start is small enough to tell the direction in which an effect begins.
+    let probe = match parameters.as_slice() {
         [p] if p.smooth && p.nominal.is_finite() => {
             p.starts.first().map(|start| vec![p.nominal + 0.1 * (start - p.nominal)])
         }
         _ => None,
     };
-    probe.into_iter().chain(all).collect()
+    probe.into_iter().chain(combined).map(|point| vec![point]).collect()
 }
 
-/// The start moved along its own direction by `factor`, where its law has one parameter and that is of some use.
-fn scaled(candidate: &Candidate, start: &[f64], factor: f64) -> Option<Vec<f64>> {
-    let [parameter] = candidate.form.parameters.as_slice() else { return None };
-    let value = parameter.nominal + factor * (start[0] - parameter.nominal);
+/// How much of the misfit the signatures of `points` explain together, and where that would have the parameters.
+fn explained(candidate: &Candidate, points: &[Vec<f64>], signatures: &[DVector<f64>], ground: &Ground) -> Option<Tried> {
+    let parameters = &candidate.form.parameters;
+    let linear: Vec<usize> = (0..parameters.len()).filter(|k| parameters[*k].linear).collect();
+    let projected: Vec<(DVector<f64>, f64)> =
+        signatures.iter().map(|s| s.component_mul(&ground.scale)).map(|s| (without(&s, &ground.hidden), s.norm())).collect();
+    let misfit = ground.residual.norm();
+    let usable = |(p, whole): &(DVector<f64>, f64)| p.norm() > 1e-9 * whole && whole.is_finite() && *whole > 0.0;
+    if misfit <= 0.0 {
+        return None;
+    }
+    if linear.is_empty() {
+        let (signature, whole) = projected.into_iter().next().filter(usable)?;
+        let length = signature.norm();
+        let score = signature.dot(&ground.residual) / (length * misfit);
+        let survival = length / whole;
+        return Some(Tried { score, survival, start: points[0].clone(), signature: signature / length, length });
+    }
+    let mut used: Vec<usize> = (0..projected.len()).filter(|i| usable(&projected[*i])).collect();
+    loop {
+        if used.is_empty() {
+            return opposed(points, projected.into_iter().find(usable)?);
+        }
+        let columns = DMatrix::from_columns(&used.iter().map(|i| projected[*i].0.clone()).collect::<Vec<_>>());
+        let gram = columns.tr_mul(&columns);
+        let weights = gram.pseudo_inverse(1e-12 * columns.norm_squared()).ok()? * columns.tr_mul(&ground.residual);
+        let mut start = points[0].clone();
+        linear.iter().for_each(|k| start[*k] = parameters[*k].nominal);
+        let mut outside = None;
+        for (i, weight) in used.iter().zip(weights.iter()) {
+            let (k, p) = (linear[*i], &parameters[linear[*i]]);
+            start[k] = p.nominal + weight * (points[*i][k] - p.nominal);
+            if !(p.lower..=p.upper).contains(&start[k]) {
+                outside = outside.or(Some(*i));
+            }
+        }
+        match outside {
+            // It would have to act the other way round: it takes no part.
+            Some(i) => used.retain(|other| *other != i),
+            None => {
+                let signature = &columns * &weights;
+                let length = signature.norm();
+                let whole: f64 = used.iter().zip(weights.iter()).map(|(i, w)| (w * projected[*i].1).powi(2)).sum();
+                let survival = (length / whole.sqrt()).min(1.0);
+                return (length > 0.0).then(|| Tried {
+                    score: length / misfit,
+                    survival,
+                    start,
+                    signature: signature / length,
+                    length,
+                });
+            }
+        }
+    }
+}
+
+/// A law that would have to act the other way round, at its first start: what refitting hides most of may turn round once
+/// it is fitted jointly.
+fn opposed(points: &[Vec<f64>], (signature, whole): (DVector<f64>, f64)) -> Option<Tried> {
+    let length = signature.norm();
+    let start = points.first()?.clone();
+    Some(Tried { score: 0.0, survival: length / whole, start, signature: signature / length, length })
+}
+
+/// The start moved along its own direction as far as the misfit reaches, where its law has one parameter and that is of
+/// some use.
+fn scaled(candidate: &Candidate, tried: &Tried, ground: &Ground) -> Option<Vec<f64>> {
+    let [p] = candidate.form.parameters.as_slice() else { return None };
+    let reach = tried.score * ground.residual.norm();
+    let factor = reach / tried.length.max(1e-300);
+    let value = p.nominal + factor * (tried.start[0] - p.nominal);
     let sensible = value.is_finite() && (0.01..100.0).contains(&factor) && (factor - 1.0).abs() > 0.2;
-    (sensible && parameter.smooth).then(|| vec![value.clamp(parameter.lower, parameter.upper)])
+    (sensible && p.smooth && !p.linear).then(|| vec![value.clamp(p.lower, p.upper)])
 }

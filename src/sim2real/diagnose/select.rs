@@ -6,6 +6,7 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
+use crate::sim2real::identify::Effort;
 use crate::sim2real::{Candidate, Twin};
 
 /// A mechanism must gain more than this to be added.
@@ -24,8 +25,22 @@ const STAGES: usize = 4;
 const ABOVE_NOISE: f64 = 1.5;
 /// Hypotheses that each stage hands to the next: the best alone may be the wrong one to build on.
 const BEAM: usize = 3;
-/// Candidates fitted from each hypothesis of the beam.
+/// Mechanisms fitted from the best hypothesis of the beam; from the others half as many.
 const FITTED: usize = 6;
+/// Of these, those that are fitted to their end: as many as stood best after a few steps.
+const FINISHED: usize = 5;
+/// A hypothesis behind the best by more than this part of what that gains is not built on.
+const FAR_BEHIND: f64 = 0.5;
+/// Further forms fitted of each of the two most promising mechanisms.
+const FURTHER_FORMS: usize = 2;
+/// Of a mechanism that survives refitting by less than this part, what screening says is worth little: ...
+const HIDDEN: f64 = 0.15;
+/// ... unless it says it this loudly ...
+const LOUD: f64 = 0.5;
+/// ... so that many such are fitted whatever it says.
+const FITTED_HIDDEN: usize = 2;
+/// Signatures with a cosine above this look alike: such rivals are fitted too.
+const ALIKE: f64 = 0.9;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
 const ALWAYS_FITTED: usize = 3;
 /// Others are fitted if their signature, with this many times the evidence the parent's residuals hold, could gain
@@ -45,14 +60,17 @@ pub(super) struct Selection<T> {
 }
 
 /// Selects stage by stage, then leaves out again what the whole does not need.
-pub(super) fn select<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> Selection<T> {
-    let recalibrated = inquiry.recalibrated();
+pub(super) fn select<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    recalibrated: Hypothesis<T>,
+    progress: Progress<'_>,
+) -> Selection<T> {
     let mut scores = Vec::new();
     let mut beam = vec![recalibrated.clone()];
     let mut best_of_stage: Vec<Hypothesis<T>> = Vec::new();
     for stage in 0..STAGES {
         progress("comparing mechanisms", stage, STAGES);
-        let (children, tried) = expand(inquiry, &beam, stage);
+        let (children, tried) = expand(inquiry, &recalibrated, &beam, stage);
         scores.extend(tried);
         let Some(best) = children.first().cloned() else { break };
         let parent = best_of_stage.last().unwrap_or(&recalibrated);
@@ -62,13 +80,35 @@ pub(super) fn select<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) 
         if !promising {
             break;
         }
-        beam = children.into_iter().take(BEAM).collect();
+        // The best alone may be the wrong one to build on; what explains far less is not the right one either.
+        let best = children[0].clone();
+        let far = FAR_BEHIND * gain(inquiry, &beam[0], &best).max(0.0);
+        beam = children.into_iter().take(BEAM).filter(|child| lead(inquiry, &best, child) <= far.max(ACCEPT)).collect();
     }
     let (selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
     Selection { recalibrated, selected, without, scores }
 }
 
 impl<T: Twin> Selection<T> {
+    /// Whether what was selected leaves hardly more than the noise.
+    pub fn complete(&self) -> bool {
+        self.selected.misfits.iter().all(|m| m.sum_of_squares <= ABOVE_NOISE * m.count as f64)
+    }
+
+    /// Notes what was added as it is, after everything else.
+    pub fn note_finished(&mut self, candidate: &Candidate, gain: f64) {
+        self.scores.push(Score {
+            mechanism: candidate.about.name.to_owned(),
+            form: candidate.form.name.to_owned(),
+            stage: self.selected.added.len() - 1,
+            screen: 0.0,
+            survival: 1.0,
+            gain: Some(gain),
+            accepted: true,
+            excited: true,
+        });
+    }
+
     /// Marks the scores of what was selected, each in the last stage in which it was tried.
     pub fn mark_accepted(&mut self, candidates: &[Candidate]) {
         for number in &self.selected.added {
@@ -80,41 +120,58 @@ impl<T: Twin> Selection<T> {
         }
     }
 
+    /// The same selection fitted with another inquiry's step of integration, and what is no longer needed left out.
+    pub fn refitted(&self, inquiry: &Inquiry<'_, T>) -> Self {
+        let recalibrated = inquiry.refitted(&self.recalibrated);
+        let whole = if self.selected.added.is_empty() { Vec::new() } else { vec![inquiry.refitted(&self.selected)] };
+        let (selected, without) = pruned(inquiry, &recalibrated, whole);
+        Self { recalibrated, selected, without, scores: self.scores.clone() }
+    }
+
     /// The selection with the `place`-th mechanism replaced by candidate `other`, and what is no longer needed left out.
     pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
         let less = &self.without[place];
         let screened = inquiry.screened(less).into_iter().find(|s| s.number == other)?;
-        let (selected, without) = pruned(inquiry, &self.recalibrated, vec![inquiry.extended(less, other, &screened)]);
-        let better = gain(inquiry, &self.recalibrated, &selected) > gain(inquiry, &self.recalibrated, &self.selected);
-        better.then(|| Self { recalibrated: self.recalibrated.clone(), selected, without, scores: self.scores.clone() })
+        let (selected, without) =
+            pruned(inquiry, &self.recalibrated, vec![inquiry.extended(less, other, &screened, Effort::Thorough)]);
+        (lead(inquiry, &selected, &self.selected) > 0.0).then(|| Self {
+            recalibrated: self.recalibrated.clone(),
+            selected,
+            without,
+            scores: self.scores.clone(),
+        })
     }
 }
 
 /// All sets one larger than those of the beam, best first, and how each mechanism did beside the best of the beam.
-fn expand<T: Twin>(inquiry: &Inquiry<'_, T>, beam: &[Hypothesis<T>], stage: usize) -> (Vec<Hypothesis<T>>, Vec<Score>) {
+fn expand<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    beam: &[Hypothesis<T>],
+    stage: usize,
+) -> (Vec<Hypothesis<T>>, Vec<Score>) {
     let mut jobs: Vec<(usize, Screened, bool)> = Vec::new();
     let mut sets: Vec<Vec<usize>> = Vec::new();
     for (place, parent) in beam.iter().enumerate() {
         let mut screened = inquiry.screened(parent);
         screened.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let effective: f64 = parent.misfits.iter().map(ChannelMisfit::effective).sum();
-        let hopeful = |score: f64| -BENEFIT_OF_DOUBT * effective * (1.0 - score * score).ln() > ACCEPT;
-        for (rank, one) in screened.into_iter().enumerate() {
+        let chosen = chosen(inquiry, first, parent, &screened, place);
+        for (one, chosen) in screened.into_iter().zip(chosen) {
             let mut set: Vec<usize> = parent.set();
             set.push(one.number);
             set.sort_unstable();
-            let fitted =
-                rank < FITTED && one.score > 0.0 && (rank < ALWAYS_FITTED || hopeful(one.score)) && !sets.contains(&set);
+            let fitted = chosen && !sets.contains(&set);
             if fitted {
                 sets.push(set);
             }
             jobs.push((place, one, fitted));
         }
     }
-    let fitted: Vec<Option<Hypothesis<T>>> = jobs
+    let brief: Vec<Option<Hypothesis<T>>> = jobs
         .par_iter()
-        .map(|(place, screened, fitted)| fitted.then(|| inquiry.extended(&beam[*place], screened.number, screened)))
+        .map(|(place, one, fitted)| fitted.then(|| inquiry.extended(&beam[*place], one.number, one, Effort::Brief)))
         .collect();
+    let fitted = finished(inquiry, &beam[0], brief);
     let scores = jobs
         .iter()
         .zip(&fitted)
@@ -127,18 +184,120 @@ fn expand<T: Twin>(inquiry: &Inquiry<'_, T>, beam: &[Hypothesis<T>], stage: usiz
                 stage,
                 screen: screened.score.max(0.0),
                 survival: screened.survival,
+                excited: screened.excited,
                 gain: child.as_ref().map(|child| gain(inquiry, &beam[0], child)),
                 accepted: false,
             }
         })
         .collect();
-    let mut children: Vec<Hypothesis<T>> = fitted.into_iter().flatten().collect();
-    // Compared with one another through what they share: the best of the beam they come from.
-    let reference = &beam[0];
-    let mut ranked: Vec<(f64, Hypothesis<T>)> =
-        children.drain(..).map(|child| (gain(inquiry, reference, &child), child)).collect();
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    (ranked.into_iter().map(|(_, child)| child).collect(), scores)
+    (ranked(inquiry, &beam[0], fitted.into_iter().flatten().collect()), scores)
+}
+
+/// Fits to their end those of the briefly fitted hypotheses that may yet be the best.
+fn finished<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    reference: &Hypothesis<T>,
+    brief: Vec<Option<Hypothesis<T>>>,
+) -> Vec<Option<Hypothesis<T>>> {
+    let order: Vec<Vec<usize>> =
+        ranked(inquiry, reference, brief.iter().flatten().cloned().collect()).iter().map(Hypothesis::set).collect();
+    brief
+        .into_par_iter()
+        .map(|one| {
+            let one = one?;
+            let rank = order.iter().position(|set| *set == one.set())?;
+            Some(if rank < FINISHED { inquiry.refitted(&one) } else { one })
+        })
+        .collect()
+}
+
+/// Hypotheses by what the evidence says of them, best first.
+///
+/// All are weighed with the number of effective residuals of the one that leaves least: each with its own, those that
+/// leave nearly the same would be ranked by the scatter of that number.
+fn ranked<T: Twin>(inquiry: &Inquiry<'_, T>, reference: &Hypothesis<T>, all: Vec<Hypothesis<T>>) -> Vec<Hypothesis<T>> {
+    let left = |h: &Hypothesis<T>| h.misfits.iter().map(|m| m.count as f64 * m.sum_of_squares.max(1e-300).ln()).sum::<f64>();
+    let Some(best) = all.iter().min_by(|a, b| left(a).total_cmp(&left(b))).cloned() else { return all };
+    let mut keyed: Vec<(f64, Hypothesis<T>)> =
+        all.into_iter().map(|h| (weighed(inquiry, reference, &h, &best), h)).collect();
+    keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    keyed.into_iter().map(|(_, h)| h).collect()
+}
+
+/// By how much the evidence prefers `a` to `b`, two alternatives of which neither need contain the other.
+pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
+    let left = |h: &Hypothesis<T>| h.misfits.iter().map(|m| m.count as f64 * m.sum_of_squares.max(1e-300).ln()).sum::<f64>();
+    weighed(inquiry, b, a, if left(a) <= left(b) { a } else { b })
+}
+
+/// Which of the screened candidates, best first, are fitted: the best mechanisms in their best forms, further forms of the
+/// very best, and whatever looks much like the best.
+fn chosen<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    parent: &Hypothesis<T>,
+    screened: &[Screened],
+    place: usize,
+) -> Vec<bool> {
+    let effective: f64 = parent.misfits.iter().map(ChannelMisfit::effective).sum();
+    // Residuals that are white hold all the evidence there is; others may hold more once more is explained.
+    let whole: f64 = parent.misfits.iter().map(|m| m.count as f64).sum();
+    let doubt = (BENEFIT_OF_DOUBT * effective).min(whole.max(effective));
+    let needed = needed_share(first, parent);
+    let hopeful = |score: f64| {
+        let explained = score * score;
+        -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && BENEFIT_OF_DOUBT * explained > needed
+    };
+    let name = |s: &Screened| inquiry.candidates[s.number].about.name;
+    let (most, further) = if place == 0 { (FITTED, FURTHER_FORMS) } else { (FITTED / 2, 0) };
+    let mut mechanisms: Vec<&str> = Vec::new();
+    let mut forms: Vec<usize> = Vec::new();
+    let mut hidden = 0;
+    screened
+        .iter()
+        .enumerate()
+        .map(|(rank, one)| {
+            if place == 0 && one.excited && one.survival < HIDDEN && one.score < LOUD {
+                hidden += 1;
+                return hidden <= FITTED_HIDDEN;
+            }
+            if one.score <= 0.0 || !one.excited || !(rank < ALWAYS_FITTED || hopeful(one.score)) {
+                return false;
+            }
+            match mechanisms.iter().position(|m| *m == name(one)) {
+                // Another form of a mechanism that is fitted already.
+                Some(known) => {
+                    forms[known] += 1;
+                    known < 2 && forms[known] <= further
+                }
+                None => {
+                    let alike = one.signature.dot(&screened[0].signature).abs() > ALIKE;
+                    let fitted = mechanisms.len() < most || alike && mechanisms.len() < 2 * most;
+                    if fitted {
+                        mechanisms.push(name(one));
+                        forms.push(0);
+                    }
+                    fitted
+                }
+            }
+        })
+        .collect()
+}
+
+/// The least part of the parent's residual that a further mechanism has to explain to be needed.
+fn needed_share<T>(first: &Hypothesis<T>, parent: &Hypothesis<T>) -> f64 {
+    if parent.added.is_empty() {
+        return 0.0;
+    }
+    let least = |(first, left): (&ChannelMisfit, &ChannelMisfit)| {
+        (SHARE * above_noise(first)).min(COMPLETES * above_noise(left)) / left.sum_of_squares.max(1e-300)
+    };
+    first.misfits.iter().zip(&parent.misfits).map(least).fold(f64::INFINITY, f64::min)
+}
+
+/// What a misfit has above the noise.
+fn above_noise(misfit: &ChannelMisfit) -> f64 {
+    (misfit.sum_of_squares - misfit.count as f64).max(0.1 * misfit.sum_of_squares)
 }
 
 /// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time.
@@ -164,7 +323,7 @@ fn pruned<T: Twin>(
         let smaller = without[weakest].clone();
         // Another set of that size, found on the way up, may have been the better one to keep.
         whole = match best_of_stage.pop() {
-            Some(other) if gain(inquiry, recalibrated, &other) > gain(inquiry, recalibrated, &smaller) => other,
+            Some(other) if lead(inquiry, &other, &smaller) > 0.0 => other,
             _ => smaller,
         };
     }
@@ -174,7 +333,6 @@ fn pruned<T: Twin>(
 fn needed<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, less: &Hypothesis<T>, whole: &Hypothesis<T>) -> bool {
     let enough = whole.added.len() == 1
         || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), whole)| {
-            let above_noise = |m: &ChannelMisfit| (m.sum_of_squares - m.count as f64).max(0.1 * m.sum_of_squares);
             let explained = less.sum_of_squares - whole.sum_of_squares;
             explained >= SHARE * above_noise(first) || explained >= COMPLETES * above_noise(less)
         });
@@ -188,12 +346,22 @@ fn needed<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, less: &Hypot
 /// `sum N_e ln(RSS0 / RSS1) - dk ln N_e`, with the effective number of residuals of the *alternative*: autocorrelated
 /// noise then does not look like evidence.
 pub(super) fn gain<T: Twin>(inquiry: &Inquiry<'_, T>, null: &Hypothesis<T>, alternative: &Hypothesis<T>) -> f64 {
+    weighed(inquiry, null, alternative, alternative)
+}
+
+/// The same with the effective number of residuals of `scale`.
+fn weighed<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    null: &Hypothesis<T>,
+    alternative: &Hypothesis<T>,
+    scale: &Hypothesis<T>,
+) -> f64 {
     let mut gain = 0.0;
     let mut effective = 1.0;
-    for (null, other) in null.misfits.iter().zip(&alternative.misfits) {
+    for ((null, other), scale) in null.misfits.iter().zip(&alternative.misfits).zip(&scale.misfits) {
         let rounding = inquiry.evidence.rounding_of(&other.channel).max(1e-9) * other.count as f64;
-        gain += other.effective() * ((null.sum_of_squares + rounding) / (other.sum_of_squares + rounding)).ln();
-        effective += other.effective();
+        gain += scale.effective() * ((null.sum_of_squares + rounding) / (other.sum_of_squares + rounding)).ln();
+        effective += scale.effective();
     }
     gain - (alternative.free() as f64 - null.free() as f64) * effective.ln()
 }

@@ -1,22 +1,9 @@
 //! The words for a verdict.
 
-use super::diagnosis::{Effect, NextExperiment, Verdict};
+use super::diagnosis::{ChannelFit, Effect, Verdict};
 use super::hypothesis::Inquiry;
 use super::verdict::Findings;
 use crate::sim2real::Twin;
-
-/// What to record next, where rivals are left.
-pub(super) fn next_experiment(verdict: Verdict, effects: &[Effect]) -> Option<NextExperiment> {
-    let rival = effects.iter().find(|e| !e.rivals.is_empty() && verdict == Verdict::Ambiguous)?;
-    let others: Vec<&str> = rival.rivals.iter().map(|r| r.mechanism.as_str()).collect();
-    Some(NextExperiment {
-        what: format!(
-            "record with other amplitudes and frequencies, so that {} and {} no longer look alike",
-            rival.mechanism,
-            others.join(", ")
-        ),
-    })
-}
 
 /// The answer, in one sentence.
 pub(super) fn summary<T: Twin>(
@@ -32,21 +19,21 @@ pub(super) fn summary<T: Twin>(
     let name = inquiry.twin.name();
     // The first channel is the one a twin is about; others speak where it gained nothing.
     let best = findings.fits.iter().find(|f| f.improvement_ci95[0] > 0.0).or(findings.fits.first());
-    let gained = best.map_or_else(String::new, |f| {
-        format!(
-            "the held-out error of {} falls from {} to {} {} (noise floor {})",
-            f.channel,
-            figure(f.recalibrated_rmse),
-            figure(f.trued_rmse),
-            f.unit,
-            figure(f.noise_floor)
-        )
-    });
+    let gained = best.map_or_else(String::new, gained);
     match verdict {
-        Verdict::Named => format!("The {name} leaves out {names}: with that modelled, {gained}."),
+        Verdict::Named => {
+            let sure = effects.iter().map(|e| format!("{} ({} sure)", title(&e.mechanism), percent(e.confidence)));
+            format!("The {name} leaves out {}: with that modelled, {gained}.", listed(&sure.collect::<Vec<_>>()))
+        }
         Verdict::Ambiguous => {
-            let rivals: Vec<String> = effects.iter().flat_map(|e| e.rivals.iter()).map(|r| title(&r.mechanism)).collect();
-            format!("The {name} leaves out {names}, or {} instead: these data do not tell; {gained}.", listed(&rivals))
+            let sure = effects.iter().map(|e| {
+                let rivals: Vec<String> =
+                    e.rivals.iter().map(|r| format!("{} ({})", title(&r.mechanism), percent(r.confidence))).collect();
+                let or = if rivals.is_empty() { String::new() } else { format!(" or {}", rivals.join(" or ")) };
+                format!("{} ({}){or}", title(&e.mechanism), percent(e.confidence))
+            });
+            let all = listed(&sure.collect::<Vec<_>>());
+            format!("The {name} leaves out {all}: these data do not tell for sure; with the first modelled, {gained}.")
         }
         Verdict::NoMismatch => format!(
             "The {name} explains the recordings once its own parameters are refitted: nothing is missing that these data show."
@@ -70,13 +57,37 @@ pub(super) fn summary<T: Twin>(
     }
 }
 
-/// A number to three digits, as a sentence bears it.
-fn figure(value: f64) -> String {
+/// By how much the held-out error of a channel falls.
+fn gained(fit: &ChannelFit) -> String {
+    let part = 1.0 - fit.trued_rmse / fit.recalibrated_rmse;
+    let by = if part.is_finite() && part > 0.0 { format!(" by {}", percent(part)) } else { String::new() };
+    let moves = if part >= 0.0 { "falls" } else { "goes" };
+    format!(
+        "the held-out error of {} {moves}{by}, from {} to {} {} (noise floor {})",
+        fit.channel,
+        figure(fit.recalibrated_rmse, 3),
+        figure(fit.trued_rmse, 3),
+        fit.unit,
+        figure(fit.noise_floor, 3)
+    )
+}
+
+/// A part of one; nothing is certain, and .2 % is not nothing.
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        p if p > 99.0 => "more than 99 %".to_owned(),
+        p if p > 0.0 && p < 1.0 => "less than 1 %".to_owned(),
+        p => format!("{p:.0} %"),
+    }
+}
+
+/// A number to so many digits, as a sentence bears it.
+pub(super) fn figure(value: f64, digits: usize) -> String {
     let magnitude = value.abs().log10().floor();
     if value == 0.0 || !(-4.0..6.0).contains(&magnitude) {
-        return if value == 0.0 { "0".to_owned() } else { format!("{value:.2e}") };
+        return if value == 0.0 { "0".to_owned() } else { format!("{value:.*e}", digits.saturating_sub(1)) };
     }
-    format!("{value:.*}", (2.0 - magnitude).max(0.0) as usize)
+    format!("{value:.*}", (digits as f64 - 1.0 - magnitude).max(0.0) as usize)
 }
 
 fn shape(findings: &Findings) -> String {
@@ -97,7 +108,8 @@ mod tests {
 
     #[test]
     fn figures_have_three_digits() {
-        let figures = [0.0648, 0.00425, 3.588, 59.75, 14_233.0, 0.0, 2.66e-8].map(figure);
+        let figures = [0.0648, 0.00425, 3.588, 59.75, 14_233.0, 0.0, 2.66e-8].map(|v| figure(v, 3));
         assert_eq!(figures, ["0.0648", "0.00425", "3.59", "59.8", "14233", "0", "2.66e-8"]);
+        assert_eq!([0.997, 0.93, 0.004, 1.0].map(percent), ["more than 99 %", "93 %", "less than 1 %", "more than 99 %"]);
     }
 }

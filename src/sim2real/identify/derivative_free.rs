@@ -1,10 +1,11 @@
 //! Fits of what has no gradient: parameters on which the output jumps.
 
 use cobyla::{RhoBeg, StopTols, minimize as cobyla_minimize};
+use rayon::prelude::*;
 
-use super::least_squares::{Fit, fit_smooth, prior_penalty};
+use super::least_squares::{Effort, Fit, fit_from, fit_smooth, prior_penalty};
 use super::problem::{Problem, State};
-use crate::sim2real::Simulator;
+use crate::sim2real::{Clock, Simulator};
 
 /// An improvement smaller than this part of the objective is none: on a plateau the first point found stays.
 const WORTHWHILE: f64 = 1e-6;
@@ -49,18 +50,33 @@ pub fn minimize(
     best.into_inner()
 }
 
-/// Fits the parameters numbered in `free` from `start`: smooth ones by [`fit_smooth`], the others by a search around it.
+/// Fits the parameters numbered in `free` from the best of `starts`: smooth ones by [`fit_from`], the others by a search
+/// around each start.
 #[must_use]
-pub fn fit<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize], state: &State) -> Fit {
+pub fn fit<S: Simulator>(
+    problem: &Problem<'_, S>,
+    starts: &[Vec<f64>],
+    free: &[usize],
+    state: &State,
+    effort: Effort,
+) -> Fit {
     let parameters = problem.simulator.parameters();
     let (smooth, stepped): (Vec<usize>, Vec<usize>) = free.iter().partition(|k| parameters[**k].smooth);
     if stepped.is_empty() {
-        return fit_smooth(problem, start, free, state);
+        return fit_from(problem, starts, free, state, effort);
     }
+    let fits: Vec<Fit> = starts.par_iter().map(|start| around(problem, start, &smooth, &stepped, state)).collect();
+    let best = fits.into_iter().min_by(|a, b| a.objective().total_cmp(&b.objective()));
+    best.unwrap_or_else(|| fit_smooth(problem, &problem.nominal(), &smooth, state))
+}
+
+/// Fits from `start`: `smooth` parameters by descent, at each point of a search over the `stepped` ones.
+fn around<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], smooth: &[usize], stepped: &[usize], state: &State) -> Fit {
+    let parameters = problem.simulator.parameters();
     let at = |point: &[f64]| {
         let mut theta = start.to_vec();
         stepped.iter().zip(point).for_each(|(k, value)| theta[*k] = *value);
-        fit_smooth(problem, &theta, &smooth, state)
+        fit_smooth(problem, &theta, smooth, state)
     };
     let from: Vec<f64> = stepped.iter().map(|k| start[*k]).collect();
     let bounds: Vec<(f64, f64)> = stepped.iter().map(|k| (parameters[*k].lower, parameters[*k].upper)).collect();
@@ -68,7 +84,20 @@ pub fn fit<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize]
         stepped.iter().zip(&from).map(|(k, v)| if *v == 0.0 { parameters[*k].scale() } else { 0.2 * v.abs() }).collect();
     let penalty =
         |point: &[f64]| stepped.iter().zip(point).map(|(k, value)| prior_penalty(problem, *k, *value)).sum::<f64>();
-    let (point, _) = minimize(|point| at(point).objective() + penalty(point), &from, &bounds, &scale, 60);
+    let point = match problem.simulator.clock() {
+        // Messages are few, and cheap to follow: the smooth parameters are fitted anew at each point.
+        Clock::Event => minimize(|point| at(point).objective() + penalty(point), &from, &bounds, &scale, 60).0,
+        // Signals are not: the smooth parameters stay where they fit best at the start.
+        Clock::Sampled { .. } => {
+            let held = at(&from);
+            let objective = |point: &[f64]| {
+                let mut theta = held.values.clone();
+                stepped.iter().zip(point).for_each(|(k, value)| theta[*k] = *value);
+                problem.evaluate(&theta, &held.state, &[]).residual.norm_squared() + penalty(point)
+            };
+            minimize(objective, &from, &bounds, &scale, 30).0
+        }
+    };
     let mut fit = at(&point);
     for (i, k) in stepped.iter().enumerate() {
         let objective = |value: f64| {
@@ -80,7 +109,8 @@ pub fn fit<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize]
     }
     fit.prior += penalty(&point);
     fit.at_bound.extend(stepped.iter().filter(|k| parameters[**k].at_bound(fit.values[**k])));
-    fit.free = free.to_vec();
+    fit.free = smooth.iter().chain(stepped).copied().collect();
+    fit.free.sort_unstable();
     fit
 }
 

@@ -1,20 +1,28 @@
 //! Output-error fits by Levenberg-Marquardt.
+//!
+//! The solver is our own because its trial points and finite differences are lanes of the same runs, and because the
+//! initial states of all parts move along with the parameters at every step (variable projection), which a general solver
+//! cannot know of.
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::storage::Owned;
-use nalgebra::{DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
-use super::bounds::Bounded;
-use super::problem::{DIFFERENCE, Problem, State};
+use super::problem::{DIFFERENCE, Evaluation, Problem, State};
 use crate::sim2real::Simulator;
 
 /// Directions in which the data move the parameters less than this part of the strongest count as not determined:
 /// derivatives are known no better than the step of their finite differences.
 const RANK_TOLERANCE: f64 = 3.0 * DIFFERENCE;
 
-/// A fit ends when a step would lower the objective by less than this part of it: a thousandth of what the weakest
-/// evidence that counts is worth.
-const CONVERGED: f64 = 1e-6;
+/// A fit ends when a step lowers the objective by less than this part of it: a thousandth of what the weakest evidence
+/// that counts is worth.
+const CONVERGED: f64 = 1e-5;
+/// Damping of a first step, relative to the curvature (Marquardt, SIAM Journal 11 (1963)).
+const DAMPING: f64 = 1e-2;
+/// Dampings tried side by side at every step, relative to the last one that did best.
+const SPREAD: [f64; 3] = [0.05, 1.0, 20.0];
+/// With more damping than this a step is none.
+const STUCK: f64 = 1e8;
 
 /// What a fit found.
 #[derive(Debug, Clone)]
@@ -23,8 +31,8 @@ pub struct Fit {
     pub values: Vec<f64>,
     /// Their standard deviations as the noise alone makes them; 0 for fixed ones, infinite for those not determined.
     pub std: Vec<f64>,
-    /// Covariance of the free parameters that the output depends on smoothly, in their order, as noise and priors make it; none where neither data nor
-    /// priors determine them all.
+    /// Covariance of the free parameters that the output depends on smoothly, in their order, as noise and priors make it;
+    /// none where neither data nor priors determine them all.
     pub covariance: Option<DMatrix<f64>>,
     /// Numbers of the parameters that were free.
     pub free: Vec<usize>,
@@ -53,88 +61,252 @@ impl Fit {
 /// Fits the parameters numbered in `free`, from `start`, by Levenberg-Marquardt within their bounds and priors.
 #[must_use]
 pub fn fit_smooth<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize], state: &State) -> Fit {
-    let mut state = state.clone();
-    let mut theta = start.to_vec();
-    let rows = measured_rows(problem);
-    let measured = |theta: &[f64], state: &State| {
-        let evaluation = problem.evaluate(theta, state, &[]);
-        (evaluation.residual.rows(0, rows).norm_squared(), evaluation.initial_step)
-    };
-    // Initial states are solved for to first order only: move them there, and fit again where that made a difference.
-    for _ in 0..4 {
-        theta = descend(problem, theta, free, &state);
-        let (foreseen, steps) = measured(&theta, &state);
-        for (values, step) in state.values.iter_mut().zip(&steps) {
-            values.iter_mut().zip(step).for_each(|(value, step)| *value += step);
-        }
-        let misfit = (foreseen / rows.max(1) as f64).sqrt().max(1.0);
-        let held = state.initial.iter().flatten().any(|p| p.prior.is_some());
-        let tempered = if held { (misfit / state.misfit).ln().abs() } else { 0.0 };
-        state.misfit = misfit;
-        if steps.iter().all(Vec::is_empty) || (measured(&theta, &state).0 / foreseen - 1.0).abs() < 1e-3 && tempered < 0.7 {
-            break;
+    let mut descent = Descent::new(problem, start, free, state);
+    descent.run(Effort::Thorough.steps());
+    descent.fit()
+}
+
+/// How far a fit goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// As far as it takes to see which of several hypotheses lead somewhere.
+    Brief,
+    /// To its end.
+    Thorough,
+}
+
+impl Effort {
+    fn steps(self) -> usize {
+        match self {
+            Self::Brief => 3,
+            Self::Thorough => 40,
         }
     }
-    describe(problem, theta, free, state)
 }
 
-fn measured_rows<S: Simulator>(problem: &Problem<'_, S>) -> usize {
-    problem.blocks().last().map_or(0, |b| b.range.end)
-}
-
-/// One run of Levenberg-Marquardt with the initial states' linearization where it is.
-fn descend<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usize], state: &State) -> Vec<f64> {
-    if free.is_empty() {
-        return theta;
+/// Fits from the best of several starts: all make a few steps, and the one that is then lowest goes on to the end, with
+/// any that comes near it.
+#[must_use]
+pub fn fit_from<S: Simulator>(
+    problem: &Problem<'_, S>,
+    starts: &[Vec<f64>],
+    free: &[usize],
+    state: &State,
+    effort: Effort,
+) -> Fit {
+    let steps = effort.steps();
+    let mut descents: Vec<Descent<'_, '_, S>> = starts
+        .par_iter()
+        .map(|start| {
+            let mut descent = Descent::new(problem, start, free, state);
+            descent.run(if starts.len() > 1 { PROBE } else { steps });
+            descent
+        })
+        .collect();
+    let lowest = descents.iter().map(|d| d.objective).fold(f64::INFINITY, f64::min);
+    match effort {
+        Effort::Brief => descents.retain(|d| d.objective <= lowest),
+        Effort::Thorough => descents.retain(|d| d.objective <= NEAR * lowest),
     }
-    let maps: Vec<Bounded> = free.iter().map(|k| Bounded::new(&problem.simulator.parameters()[*k])).collect();
-    let point = DVector::from_iterator(free.len(), free.iter().zip(&maps).map(|(k, map)| map.free(theta[*k])));
-    let mut target = Target { problem, state, free, maps, point: point.clone(), theta, cached: None };
-    target.set_params(&point);
-    let settings = LevenbergMarquardt::new().with_ftol(CONVERGED).with_xtol(1e-6).with_stepbound(1.0).with_patience(10);
-    settings.minimize(target).0.theta
+    if starts.len() > 1 {
+        descents.par_iter_mut().for_each(|d| d.run(steps));
+    }
+    match descents.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective)) {
+        Some(best) => best.fit(),
+        None => fit_smooth(problem, &problem.nominal(), free, state),
+    }
 }
 
-/// The problem as the solver sees it: unbounded parameters, priors as further residuals.
-struct Target<'a, 'b, S: Simulator> {
+/// Steps that tell which starts lead somewhere.
+const PROBE: usize = 3;
+/// A start that stands at most this much higher than the best is followed too.
+const NEAR: f64 = 1.05;
+
+/// A fit under way.
+struct Descent<'a, 'b, S: Simulator> {
     problem: &'a Problem<'b, S>,
-    state: &'a State,
     free: &'a [usize],
-    maps: Vec<Bounded>,
-    point: DVector<f64>,
     theta: Vec<f64>,
-    cached: Option<DVector<f64>>,
+    state: State,
+    /// At `theta` and `state`.
+    evaluation: Evaluation,
+    /// The same, priors of the parameters included.
+    objective: f64,
+    damping: f64,
+    ended: bool,
 }
 
-impl<S: Simulator> LeastSquaresProblem<f64, Dyn, Dyn> for Target<'_, '_, S> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
+impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
+    fn new(problem: &'a Problem<'b, S>, start: &[f64], free: &'a [usize], state: &State) -> Self {
+        let parameters = problem.simulator.parameters();
+        let theta: Vec<f64> = start.iter().zip(parameters).map(|(value, p)| value.clamp(p.lower, p.upper)).collect();
+        let state = state.clone();
+        let evaluation = problem.evaluate(&theta, &state, free);
+        let mut descent = Self { problem, free, theta, state, evaluation, objective: 0.0, damping: DAMPING, ended: false };
+        descent.temper();
+        descent
+    }
 
-    fn set_params(&mut self, point: &DVector<f64>) {
-        self.point.copy_from(point);
-        for ((k, map), z) in self.free.iter().zip(&self.maps).zip(point.iter()) {
-            self.theta[*k] = map.value(*z);
+    /// Holds the priors of initial states against the misfit as it is now.
+    fn temper(&mut self) {
+        let rows = self.evaluation.measured.max(1) as f64;
+        let misfit = (self.evaluation.residual.rows(0, self.evaluation.measured).norm_squared() / rows).sqrt().max(1.0);
+        // Within a tenth nothing is gained by changing what is being minimized.
+        if (misfit / self.state.misfit).ln().abs() > 0.1 {
+            self.state.misfit = misfit;
+            self.evaluation = self.problem.evaluate(&self.theta, &self.state, self.free);
         }
-        self.cached = None;
+        self.objective = self.evaluation.objective + self.prior(&self.theta);
     }
 
-    fn params(&self) -> DVector<f64> {
-        self.point.clone()
+    fn prior(&self, theta: &[f64]) -> f64 {
+        self.free.iter().map(|k| prior_penalty(self.problem, *k, theta[*k])).sum()
     }
 
-    fn residuals(&self) -> Option<DVector<f64>> {
-        let evaluation = self.problem.evaluate(&self.theta, self.state, &[]);
-        Some(with_priors(self.problem, &self.theta, self.free, evaluation.residual))
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let evaluation = self.problem.evaluate(&self.theta, self.state, self.free);
-        let mut jacobian = jacobian_with_priors(self.problem, self.free, evaluation.jacobian);
-        for ((mut column, map), z) in jacobian.column_iter_mut().zip(&self.maps).zip(self.point.iter()) {
-            column *= map.slope(*z);
+    /// Makes at most `steps` more steps.
+    fn run(&mut self, steps: usize) {
+        let mut small = 0;
+        for _ in 0..steps {
+            if self.ended {
+                return;
+            }
+            let before = self.objective;
+            self.step();
+            // One small step may be the bend of a valley; two are its end.
+            small = if self.objective > before * (1.0 - CONVERGED) { small + 1 } else { 0 };
+            self.ended |= small >= 2;
         }
-        Some(jacobian)
+    }
+
+    /// One step: the best of several dampings, or none where more damping does not help either.
+    fn step(&mut self) {
+        let (information, gradient) = self.normal_equations();
+        let held = self.held(&gradient);
+        while self.damping < STUCK {
+            let points: Vec<(Vec<f64>, State)> =
+                SPREAD.iter().map(|s| self.moved(&information, &gradient, &held, s * self.damping)).collect();
+            let values = self.problem.objectives(&points);
+            let best = values
+                .iter()
+                .zip(&points)
+                .map(|(value, (theta, _))| value + self.prior(theta))
+                .enumerate()
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((k, value)) = best.filter(|(_, value)| *value < self.objective) {
+                let Some((theta, state)) = points.into_iter().nth(k) else { return };
+                // A step too small to matter needs no new derivatives.
+                let matters = value < self.objective * (1.0 - 0.1 * CONVERGED);
+                (self.theta, self.state) = (theta, state);
+                self.damping = (self.damping * SPREAD[k]).max(1e-9);
+                self.evaluation = self.problem.evaluate(&self.theta, &self.state, self.free);
+                self.temper();
+                self.ended |= !matters;
+                return;
+            }
+            self.damping *= SPREAD[2] * SPREAD[2];
+        }
+        self.ended = true;
+    }
+
+    /// `J'J` and `J'r`, priors of the parameters included.
+    fn normal_equations(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let jacobian = &self.evaluation.jacobian;
+        let mut information = jacobian.tr_mul(jacobian);
+        let mut gradient = jacobian.tr_mul(&self.evaluation.residual);
+        for (i, k) in self.free.iter().enumerate() {
+            let weight = prior_weight(self.problem, *k).powi(2);
+            information[(i, i)] += weight;
+            if weight > 0.0 {
+                gradient[i] += weight * (self.theta[*k] - self.problem.simulator.parameters()[*k].nominal);
+            }
+        }
+        (information, gradient)
+    }
+
+    /// Which free parameters stand at a bound that the gradient pushes them against, or move nothing.
+    fn held(&self, gradient: &DVector<f64>) -> Vec<bool> {
+        let parameters = self.problem.simulator.parameters();
+        self.free
+            .iter()
+            .enumerate()
+            .map(|(i, k)| {
+                let (value, p) = (self.theta[*k], &parameters[*k]);
+                value <= p.lower && gradient[i] >= 0.0 || value >= p.upper && gradient[i] <= 0.0
+            })
+            .collect()
+    }
+
+    /// Where a step of this damping leads, initial states and all.
+    fn moved(&self, information: &DMatrix<f64>, gradient: &DVector<f64>, held: &[bool], damping: f64) -> (Vec<f64>, State) {
+        let parameters = self.problem.simulator.parameters();
+        let step = damped_step(information, gradient, held, damping);
+        let mut theta = self.theta.clone();
+        let mut made = DVector::zeros(self.free.len());
+        for (i, k) in self.free.iter().enumerate() {
+            theta[*k] = (theta[*k] + step[i]).clamp(parameters[*k].lower, parameters[*k].upper);
+            made[i] = theta[*k] - self.theta[*k];
+        }
+        let mut state = self.state.clone();
+        for (part, values) in state.values.iter_mut().enumerate() {
+            let along = &self.evaluation.initial_by_parameter[part] * &made;
+            for ((value, step), along) in values.iter_mut().zip(&self.evaluation.initial_step[part]).zip(along.iter()) {
+                *value += step - along;
+            }
+        }
+        (theta, state)
+    }
+
+    /// Residuals, derivatives and their consequences where the descent has come.
+    fn fit(self) -> Fit {
+        let Self { problem, free, theta, state, evaluation, .. } = self;
+        let parameters = problem.simulator.parameters();
+        let scales: Vec<f64> = free.iter().map(|k| parameters[*k].scale()).collect();
+        let mut scaled = evaluation.jacobian.clone();
+        scaled.column_iter_mut().zip(&scales).for_each(|(mut column, scale)| column *= *scale);
+        let mut information = scaled.tr_mul(&scaled);
+        let rank = rank(&information);
+        for (i, k) in free.iter().enumerate() {
+            information[(i, i)] += (prior_weight(problem, *k) * scales[i]).powi(2);
+        }
+        let covariance = if free.is_empty() { None } else { information.try_inverse() }
+            .map(|inverse| DMatrix::from_fn(free.len(), free.len(), |i, j| inverse[(i, j)] * scales[i] * scales[j]));
+        let mut std = vec![0.0; theta.len()];
+        for (i, k) in free.iter().enumerate() {
+            let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]);
+            std[*k] = if variance >= 0.0 { variance.sqrt() } else { f64::INFINITY };
+        }
+        let at_bound = free.iter().copied().filter(|k| parameters[*k].at_bound(theta[*k])).collect();
+        let prior = free.iter().map(|k| prior_penalty(problem, *k, theta[*k])).sum();
+        Fit {
+            values: theta,
+            std,
+            covariance,
+            free: free.to_vec(),
+            state,
+            residual: evaluation.residual,
+            jacobian: evaluation.jacobian,
+            rank,
+            prior,
+            at_bound,
+        }
+    }
+}
+
+/// `-(H + damping diag H)^-1 g` over the parameters that are not held, in units in which the diagonal of `H` is 1.
+fn damped_step(information: &DMatrix<f64>, gradient: &DVector<f64>, held: &[bool], damping: f64) -> DVector<f64> {
+    let count = gradient.len();
+    let length: Vec<f64> = (0..count).map(|i| information[(i, i)].sqrt()).map(|l| if l > 0.0 { l } else { 1.0 }).collect();
+    let loose = |i: usize| !held[i] && information[(i, i)] > 0.0;
+    let matrix = DMatrix::from_fn(count, count, |i, j| match (i == j, loose(i) && loose(j)) {
+        (true, true) => 1.0 + damping,
+        (true, false) => 1.0,
+        (false, true) => information[(i, j)] / (length[i] * length[j]),
+        (false, false) => 0.0,
+    });
+    let right = DVector::from_fn(count, |i, _| if loose(i) { -gradient[i] / length[i] } else { 0.0 });
+    match matrix.cholesky() {
+        Some(cholesky) => cholesky.solve(&right).zip_map(&DVector::from_vec(length), |step, length| step / length),
+        None => DVector::zeros(count),
     }
 }
 
@@ -149,74 +321,13 @@ pub(super) fn prior_penalty<S: Simulator>(problem: &Problem<'_, S>, k: usize, va
     if weight > 0.0 { (weight * (value - problem.simulator.parameters()[k].nominal)).powi(2) } else { 0.0 }
 }
 
-fn with_priors<S: Simulator>(
-    problem: &Problem<'_, S>,
-    theta: &[f64],
-    free: &[usize],
-    residual: DVector<f64>,
-) -> DVector<f64> {
-    let rows = residual.len();
-    let mut out = residual.resize_vertically(rows + free.len(), 0.0);
-    for (i, k) in free.iter().enumerate() {
-        let nominal = problem.simulator.parameters()[*k].nominal;
-        let weight = prior_weight(problem, *k);
-        out[rows + i] = if weight > 0.0 { weight * (theta[*k] - nominal) } else { 0.0 };
-    }
-    out
-}
-
-fn jacobian_with_priors<S: Simulator>(problem: &Problem<'_, S>, free: &[usize], jacobian: DMatrix<f64>) -> DMatrix<f64> {
-    let rows = jacobian.nrows();
-    let mut out = jacobian.resize_vertically(rows + free.len(), 0.0);
-    for (i, k) in free.iter().enumerate() {
-        out[(rows + i, i)] = prior_weight(problem, *k);
-    }
-    out
-}
-
-/// Number of directions in which the columns reach, to within [`RANK_TOLERANCE`] of the longest reach.
-fn rank(columns: &DMatrix<f64>) -> usize {
-    // Of nothing there are no singular values to ask for.
-    if columns.is_empty() {
+/// Number of directions in which columns with this Gram matrix reach, to within [`RANK_TOLERANCE`] of the longest reach.
+fn rank(gram: &DMatrix<f64>) -> usize {
+    // Of nothing there are no eigenvalues to ask for.
+    if gram.is_empty() || gram.iter().any(|v| !v.is_finite()) {
         return 0;
     }
-    let singular = columns.singular_values();
-    let strongest = singular.iter().copied().fold(0.0, f64::max);
-    singular.iter().filter(|s| **s > RANK_TOLERANCE * strongest && **s > 0.0).count()
-}
-
-/// Residuals, derivatives and their consequences at the solution.
-fn describe<S: Simulator>(problem: &Problem<'_, S>, theta: Vec<f64>, free: &[usize], state: State) -> Fit {
-    let evaluation = problem.evaluate(&theta, &state, free);
-    let parameters = problem.simulator.parameters();
-    let scales: Vec<f64> = free.iter().map(|k| parameters[*k].scale()).collect();
-    let mut scaled = evaluation.jacobian.clone();
-    scaled.column_iter_mut().zip(&scales).for_each(|(mut column, scale)| column *= *scale);
-    let rank = rank(&scaled);
-
-    let mut information = scaled.tr_mul(&scaled);
-    for (i, k) in free.iter().enumerate() {
-        information[(i, i)] += (prior_weight(problem, *k) * scales[i]).powi(2);
-    }
-    let covariance = if free.is_empty() { None } else { information.try_inverse() }
-        .map(|inverse| DMatrix::from_fn(free.len(), free.len(), |i, j| inverse[(i, j)] * scales[i] * scales[j]));
-    let mut std = vec![0.0; theta.len()];
-    for (i, k) in free.iter().enumerate() {
-        let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]);
-        std[*k] = if variance >= 0.0 { variance.sqrt() } else { f64::INFINITY };
-    }
-    let at_bound = free.iter().copied().filter(|k| parameters[*k].at_bound(theta[*k])).collect();
-    let prior = free.iter().map(|k| prior_penalty(problem, *k, theta[*k])).sum();
-    Fit {
-        values: theta,
-        std,
-        covariance,
-        free: free.to_vec(),
-        state,
-        residual: evaluation.residual,
-        jacobian: evaluation.jacobian,
-        rank,
-        prior,
-        at_bound,
-    }
+    let squared = gram.clone().symmetric_eigenvalues();
+    let strongest = squared.iter().copied().fold(0.0, f64::max);
+    squared.iter().filter(|s| **s > RANK_TOLERANCE * RANK_TOLERANCE * strongest && **s > 0.0).count()
 }

@@ -3,11 +3,10 @@
 //! [`fit`] is an output-error fit: the simulator runs free and its outputs are compared with the measured ones. Parameters
 //! that the output depends on smoothly are found by Levenberg-Marquardt, those on which it jumps without derivatives.
 
-mod bounds;
 mod derivative_free;
 mod least_squares;
 mod problem;
 
 pub use derivative_free::{fit, minimize};
-pub use least_squares::{Fit, fit_smooth};
+pub use least_squares::{Effort, Fit, fit_from, fit_smooth};
 pub use problem::{Block, Evaluation, Problem, State};

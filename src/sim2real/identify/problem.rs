@@ -51,8 +51,16 @@ pub struct Evaluation {
     pub residual: DVector<f64>,
     /// Derivatives of the residual, one column a parameter asked for.
     pub jacobian: DMatrix<f64>,
+    /// Number of residuals that are of measurements.
+    pub measured: usize,
     /// By how much each part's initial parameters should move, to first order.
     pub initial_step: Vec<Vec<f64>>,
+    /// How these steps change with the parameters asked for: to be taken off, one row an initial parameter.
+    pub initial_by_parameter: Vec<DMatrix<f64>>,
+    /// What each part's initial parameters can explain: an orthonormal basis over its measured rows, then their priors'.
+    pub initial_basis: Vec<DMatrix<f64>>,
+    /// Sum of squares of what is measured and of what priors of initial states add, before they are moved.
+    pub objective: f64,
 }
 
 /// One part evaluated: residuals, and one column a perturbed parameter.
@@ -60,6 +68,9 @@ struct Piece {
     residual: DVector<f64>,
     jacobian: DMatrix<f64>,
     initial_step: Vec<f64>,
+    initial_by_parameter: DMatrix<f64>,
+    initial_basis: DMatrix<f64>,
+    objective: f64,
 }
 
 impl<S: Simulator> Problem<'_, S> {
@@ -116,7 +127,66 @@ impl<S: Simulator> Problem<'_, S> {
             at += count;
             prior_at += priors;
         }
-        Evaluation { residual, jacobian, initial_step: pieces.iter().map(|p| p.initial_step.clone()).collect() }
+        Evaluation {
+            residual,
+            jacobian,
+            measured: at,
+            initial_step: pieces.iter().map(|p| p.initial_step.clone()).collect(),
+            initial_by_parameter: pieces.iter().map(|p| p.initial_by_parameter.clone()).collect(),
+            initial_basis: pieces.iter().map(|p| p.initial_basis.clone()).collect(),
+            objective: pieces.iter().map(|p| p.objective).sum(),
+        }
+    }
+
+    /// The nominal values of the simulator's parameters.
+    #[must_use]
+    pub fn nominal(&self) -> Vec<f64> {
+        self.simulator.parameters().iter().map(|p| p.nominal).collect()
+    }
+
+    /// Measured residuals at several points of the simulator's parameters, from the same initial states: one vector a
+    /// point, in the order of [`Problem::blocks`], with what `basis` explains taken out, part by part.
+    #[must_use]
+    pub fn residuals(&self, thetas: &[Vec<f64>], state: &State, basis: &[DMatrix<f64>]) -> Vec<DVector<f64>> {
+        let of_part = |(number, part): (usize, &Part<'_, S::Stimulus>)| -> Vec<DVector<f64>> {
+            let lanes: Vec<Vec<f64>> =
+                thetas.iter().map(|theta| theta.iter().chain(&state.values[number]).copied().collect()).collect();
+            let runs = self.simulator.rollout(&Thetas::from_lanes(&lanes), part.recording, part.followed(), self.seed);
+            runs.iter()
+                .map(|run| {
+                    let residual = self.residual(part, run);
+                    // The priors' rows of the basis meet zeros: only its measured rows count.
+                    let known = basis[number].rows(0, residual.len());
+                    let explained = &known * known.tr_mul(&residual);
+                    residual - explained
+                })
+                .collect()
+        };
+        let parts: Vec<Vec<DVector<f64>>> = self.parts.par_iter().enumerate().map(of_part).collect();
+        (0..thetas.len())
+            .map(|k| {
+                let rows: usize = parts.iter().map(|p| p[k].len()).sum();
+                let values = parts.iter().flat_map(|p| p[k].iter().copied());
+                DVector::from_iterator(rows, values)
+            })
+            .collect()
+    }
+
+    /// Sums of squared residuals at several points, priors of initial states included: lanes of the same runs.
+    #[must_use]
+    pub fn objectives(&self, points: &[(Vec<f64>, State)]) -> Vec<f64> {
+        let of_part = |(number, part): (usize, &Part<'_, S::Stimulus>)| -> Vec<f64> {
+            let lanes: Vec<Vec<f64>> =
+                points.iter().map(|(theta, state)| theta.iter().chain(&state.values[number]).copied().collect()).collect();
+            let runs = self.simulator.rollout(&Thetas::from_lanes(&lanes), part.recording, part.followed(), self.seed);
+            let prior = |state: &State| -> f64 {
+                let (initial, values) = (&state.initial[number], &state.values[number]);
+                initial.iter().zip(values).map(|(p, v)| (weight(p, state.misfit) * (v - p.nominal)).powi(2)).sum()
+            };
+            runs.iter().zip(points).map(|(run, (_, state))| self.residual(part, run).norm_squared() + prior(state)).collect()
+        };
+        let parts: Vec<Vec<f64>> = self.parts.par_iter().enumerate().map(of_part).collect();
+        (0..points.len()).map(|k| parts.iter().map(|values| values[k]).sum()).collect()
     }
 
     fn piece(
@@ -196,6 +266,11 @@ fn difference(parameter: &Parameter, value: f64) -> f64 {
     if value + step > parameter.upper { -step } else { step }
 }
 
+/// The weight of an initial parameter's prior: none where it is flat.
+fn weight(parameter: &Parameter, misfit: f64) -> f64 {
+    parameter.prior.map_or(0.0, |std| misfit / std.max(1e-12 * parameter.scale()))
+}
+
 /// Takes out of residual and derivatives what the initial state explains, within its priors.
 ///
 /// With `A = [J_i; W]`, where `W` holds the priors' weights, the best step of the initial state leaves
@@ -209,7 +284,7 @@ fn project(
     misfit: f64,
 ) -> Piece {
     let (rows, count) = (residual.len(), initial.len());
-    let weight: Vec<f64> = initial.iter().map(|p| p.prior.map_or(0.0, |std| misfit / std.max(1e-12 * p.scale()))).collect();
+    let weight: Vec<f64> = initial.iter().map(|p| weight(p, misfit)).collect();
     let extended = |top: &DVector<f64>, bottom: &dyn Fn(usize) -> f64| {
         DVector::from_fn(rows + count, |i, _| if i < rows { top[i] } else { bottom(i - rows) })
     };
@@ -219,7 +294,16 @@ fn project(
         if columns.is_empty() { DMatrix::zeros(rows + count, 0) } else { DMatrix::from_columns(columns) }
     };
     if count == 0 {
-        return Piece { residual: b, jacobian: jacobian(&columns), initial_step: Vec::new() };
+        let objective = b.norm_squared();
+        let initial_by_parameter = DMatrix::zeros(0, columns.len());
+        return Piece {
+            residual: b,
+            jacobian: jacobian(&columns),
+            initial_step: Vec::new(),
+            initial_by_parameter,
+            initial_basis: DMatrix::zeros(rows, 0),
+            objective,
+        };
     }
     let a: Vec<DVector<f64>> =
         by_initial.iter().enumerate().map(|(k, d)| extended(d, &|i| if i == k { weight[k] } else { 0.0 })).collect();
@@ -227,6 +311,19 @@ fn project(
     let (q, r) = (qr.q(), qr.r());
     let without = |v: &DVector<f64>| v - &q * q.tr_mul(v);
     let step = r.solve_upper_triangular(&(-q.tr_mul(&b))).unwrap_or_else(|| DVector::zeros(count));
+    let along = |v: &DVector<f64>| r.solve_upper_triangular(&q.tr_mul(v)).unwrap_or_else(|| DVector::zeros(count));
+    let initial_by_parameter = DMatrix::from_fn(count, columns.len(), |_, _| 0.0);
+    let initial_by_parameter = columns.iter().enumerate().fold(initial_by_parameter, |mut all, (k, column)| {
+        all.set_column(k, &along(column));
+        all
+    });
     let columns: Vec<DVector<f64>> = columns.iter().map(without).collect();
-    Piece { residual: without(&b), jacobian: jacobian(&columns), initial_step: step.iter().copied().collect() }
+    Piece {
+        residual: without(&b),
+        jacobian: jacobian(&columns),
+        initial_step: step.iter().copied().collect(),
+        initial_by_parameter,
+        objective: b.norm_squared(),
+        initial_basis: q,
+    }
 }

@@ -1,5 +1,6 @@
 //! An actuator that follows its command with a lag.
 
+use super::decay::Decay;
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `time_constant du/dt = u_command - u`; in the form `two_stage`, two such lags of half of `total_time` each, one after the
@@ -51,24 +52,6 @@ struct Lag {
     /// What the actuator gives at the start of the tick; none before the first command, which it has already reached.
     follower: Vec<Option<f64>>,
     decay: Decay,
-}
-
-/// `1 - exp(-step / time_constant)` over lanes, kept while the step stays the same: an exponential costs more than
-/// all the rest of the law.
-#[derive(Clone, Default)]
-struct Decay {
-    step: f64,
-    gained: Vec<f64>,
-}
-
-impl Decay {
-    fn over(&mut self, step: f64, time_constant: &[f64]) -> &[f64] {
-        if self.gained.is_empty() || self.step.to_bits() != step.to_bits() {
-            self.step = step;
-            self.gained = time_constant.iter().map(|tau| if *tau > 0.0 { -(-step / tau).exp_m1() } else { 1.0 }).collect();
-        }
-        &self.gained
-    }
 }
 
 impl<P: Plant> Law<P> for Lags

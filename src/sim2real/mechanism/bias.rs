@@ -26,7 +26,7 @@ where
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.02, -0.02].map(|fraction| fraction * typical.output);
-        Form::only(vec![Parameter::new("offset", "output", 0.0).starting_at(&starts)])
+        Form::only(vec![Parameter::new("offset", "output", 0.0).starting_at(&starts).proportional()])
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

@@ -1,0 +1,251 @@
+//! Expressions made ready to be evaluated over all lanes at once.
+
+use super::expression::{Expression, FUNCTIONS, FUNCTIONS_OF_TWO, Operator};
+
+/// What an instruction does with its operands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Op {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Negate,
+    Power,
+    Of(usize),
+    OfTwo(usize),
+}
+
+/// `slot[to] = op(slot[left], slot[right])`; operands always stand before `to`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Instruction {
+    op: Op,
+    left: usize,
+    right: usize,
+    to: usize,
+}
+
+/// Expressions as instructions on slots, each of which holds one number a lane: first what is given (`fixed` names, then
+/// `varying` ones), then constants, then what the instructions make. What depends on `fixed` names alone is computed once
+/// a run; what stands in several expressions, once.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Program {
+    constants: Vec<(usize, f64)>,
+    once: Vec<Instruction>,
+    each: Vec<Instruction>,
+    /// The slots of the expressions' values.
+    outputs: Vec<usize>,
+    slots: usize,
+}
+
+/// A program under construction: slots that are given, hold a constant, or the result of an instruction.
+#[derive(Default)]
+struct Builder<'a> {
+    /// What a name stands for.
+    named: Vec<(&'a str, usize)>,
+    constants: Vec<(usize, f64)>,
+    instructions: Vec<Instruction>,
+    /// Of each slot, whether it is the same throughout a run.
+    lasting: Vec<bool>,
+}
+
+impl Program {
+    /// A program that computes `expressions` from the `fixed` names, whose values stay throughout a run, and the `varying`
+    /// ones; slot `k` is that of the `k`-th of both. Each of the `definitions` may use those before it.
+    ///
+    /// # Errors
+    /// The first name in them that stands for nothing.
+    pub fn compile(
+        fixed: &[String],
+        varying: &[String],
+        definitions: &[(String, Expression)],
+        expressions: &[&Expression],
+    ) -> Result<Self, String> {
+        let named = fixed.iter().chain(varying).enumerate().map(|(slot, name)| (name.as_str(), slot)).collect();
+        let lasting = fixed.iter().map(|_| true).chain(varying.iter().map(|_| false)).collect();
+        let mut builder = Builder { named, lasting, ..Builder::default() };
+        for (name, definition) in definitions {
+            let slot = builder.add(definition)?;
+            builder.named.push((name, slot));
+        }
+        let outputs = expressions.iter().map(|e| builder.add(e)).collect::<Result<Vec<usize>, String>>()?;
+        let Builder { constants, instructions, lasting, .. } = builder;
+        let (once, each) = instructions.into_iter().partition(|instruction| lasting[instruction.to]);
+        Ok(Self { constants, once, each, outputs, slots: lasting.len() })
+    }
+
+    /// Memory for `lanes` lanes, in which the fixed names have the values of `fixed`, a row a name.
+    pub fn memory<'a>(&self, lanes: usize, fixed: impl IntoIterator<Item = &'a [f64]>) -> Memory {
+        let mut memory = Memory { lanes, values: vec![0.0; self.slots * lanes] };
+        for (slot, values) in fixed.into_iter().enumerate() {
+            memory.slot_mut(slot).copy_from_slice(values);
+        }
+        for (slot, value) in &self.constants {
+            memory.slot_mut(*slot).fill(*value);
+        }
+        self.once.iter().for_each(|instruction| memory.execute(*instruction));
+        memory
+    }
+
+    /// Computes the expressions from what stands in the slots of the varying names.
+    pub fn run(&self, memory: &mut Memory) {
+        self.each.iter().for_each(|instruction| memory.execute(*instruction));
+    }
+
+    /// The value of expression `k`, one a lane.
+    pub fn output<'m>(&self, memory: &'m Memory, k: usize) -> &'m [f64] {
+        memory.slot(self.outputs[k])
+    }
+}
+
+/// The slots of a program over lanes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Memory {
+    lanes: usize,
+    values: Vec<f64>,
+}
+
+impl Memory {
+    /// The values of a slot, one a lane.
+    pub fn slot(&self, slot: usize) -> &[f64] {
+        &self.values[slot * self.lanes..(slot + 1) * self.lanes]
+    }
+
+    /// As [`slot`](Self::slot), to be written.
+    pub fn slot_mut(&mut self, slot: usize) -> &mut [f64] {
+        &mut self.values[slot * self.lanes..(slot + 1) * self.lanes]
+    }
+
+    fn execute(&mut self, Instruction { op, left, right, to }: Instruction) {
+        let lanes = self.lanes;
+        let (before, from) = self.values.split_at_mut(to * lanes);
+        let result = &mut from[..lanes];
+        let (left, right) = (&before[left * lanes..][..lanes], &before[right * lanes..][..lanes]);
+        let operands = result.iter_mut().zip(left.iter().zip(right));
+        match op {
+            Op::Add => operands.for_each(|(to, (a, b))| *to = a + b),
+            Op::Subtract => operands.for_each(|(to, (a, b))| *to = a - b),
+            Op::Multiply => operands.for_each(|(to, (a, b))| *to = a * b),
+            Op::Divide => operands.for_each(|(to, (a, b))| *to = a / b),
+            Op::Negate => operands.for_each(|(to, (a, _))| *to = -a),
+            Op::Power => operands.for_each(|(to, (a, b))| *to = a.powf(*b)),
+            Op::Of(function) => {
+                let function = FUNCTIONS[function].1;
+                operands.for_each(|(to, (a, _))| *to = function(*a));
+            }
+            Op::OfTwo(function) => {
+                let function = FUNCTIONS_OF_TWO[function].1;
+                operands.for_each(|(to, (a, b))| *to = function(*a, *b));
+            }
+        }
+    }
+}
+
+impl Builder<'_> {
+    fn add(&mut self, expression: &Expression) -> Result<usize, String> {
+        Ok(match expression {
+            Expression::Number(value) => self.constant(*value),
+            Expression::Name(name) => {
+                self.named.iter().find(|(known, _)| known == name).map(|(_, slot)| *slot).ok_or_else(|| name.clone())?
+            }
+            Expression::Negative(one) => {
+                let one = self.add(one)?;
+                self.result(Op::Negate, one, one)
+            }
+            Expression::Of(function, one) => {
+                let one = self.add(one)?;
+                self.result(Op::Of(*function), one, one)
+            }
+            Expression::OfTwo(function, left, right) => {
+                let (left, right) = (self.add(left)?, self.add(right)?);
+                self.result(Op::OfTwo(*function), left, right)
+            }
+            Expression::Join(Operator::Power, base, exponent) => {
+                let base = self.add(base)?;
+                match **exponent {
+                    // Products are faster than a general power, and exact for whole exponents.
+                    Expression::Number(whole) if whole.fract() == 0.0 && (1.0..=8.0).contains(&whole) => {
+                        (1..whole as usize).fold(base, |power, _| self.result(Op::Multiply, power, base))
+                    }
+                    _ => {
+                        let exponent = self.add(exponent)?;
+                        self.result(Op::Power, base, exponent)
+                    }
+                }
+            }
+            Expression::Join(operator, left, right) => {
+                let (left, right) = (self.add(left)?, self.add(right)?);
+                let op = match operator {
+                    Operator::Add => Op::Add,
+                    Operator::Subtract => Op::Subtract,
+                    Operator::Multiply => Op::Multiply,
+                    Operator::Divide => Op::Divide,
+                    Operator::Power => Op::Power,
+                };
+                self.result(op, left, right)
+            }
+        })
+    }
+
+    fn constant(&mut self, value: f64) -> usize {
+        if let Some((slot, _)) = self.constants.iter().find(|(_, known)| known.to_bits() == value.to_bits()) {
+            return *slot;
+        }
+        self.lasting.push(true);
+        self.constants.push((self.lasting.len() - 1, value));
+        self.lasting.len() - 1
+    }
+
+    fn result(&mut self, op: Op, left: usize, right: usize) -> usize {
+        let known = self.instructions.iter().find(|i| (i.op, i.left, i.right) == (op, left, right));
+        if let Some(known) = known {
+            return known.to;
+        }
+        let to = self.lasting.len();
+        self.lasting.push(self.lasting[left] && self.lasting[right]);
+        self.instructions.push(Instruction { op, left, right, to });
+        to
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(names: &[&str]) -> Vec<String> {
+        names.iter().map(|name| (*name).to_owned()).collect()
+    }
+
+    #[test]
+    fn computes_every_lane_and_what_lasts_only_once() {
+        let definitions = [("spring".to_owned(), Expression::parse("k3*x^3").unwrap())];
+        let texts = ["(k*u - d*v - spring)/m", "sqrt(k/m)*v + 2*pi", "max(x, 0)^1.5", "v"];
+        let expressions = texts.map(|text| Expression::parse(text).unwrap());
+        let (fixed, varying) = (names(&["m", "d", "k", "k3"]), names(&["u", "x", "v"]));
+        let program = Program::compile(&fixed, &varying, &definitions, &expressions.each_ref()).unwrap();
+        // sqrt(k/m) and 2*pi.
+        assert_eq!(program.once.len(), 3);
+        let parameters: [[f64; 2]; 4] = [[1.5, 2.0], [0.2, 0.3], [4.0, 5.0], [0.7, 0.8]];
+        let mut memory = program.memory(2, parameters.iter().map(<[f64; 2]>::as_slice));
+        for (u, x, v) in [(0.3, 1.2, -0.4), (-1.0, 0.5, 2.0)] {
+            for (slot, value) in [(4, u), (5, x), (6, v)] {
+                memory.slot_mut(slot).copy_from_slice(&[value, 2.0 * value]);
+            }
+            program.run(&mut memory);
+            for lane in 0..2 {
+                let [m, d, k, k3] = parameters.map(|row| row[lane]);
+                let [u, x, v] = [u, x, v].map(|value: f64| value * (lane + 1) as f64);
+                let expected = [
+                    (k * u - d * v - k3 * (x * x * x)) / m,
+                    (k / m).sqrt() * v + 2.0 * std::f64::consts::PI,
+                    x.max(0.0).powf(1.5),
+                    v,
+                ];
+                for (output, expected) in expected.into_iter().enumerate() {
+                    assert_eq!(program.output(&memory, output)[lane], expected, "{}", texts[output]);
+                }
+            }
+        }
+        let unknown = Expression::parse("k*w").unwrap();
+        assert_eq!(Program::compile(&fixed, &varying, &[], &[&unknown]), Err("w".to_owned()));
+    }
+}

@@ -1,0 +1,122 @@
+//! What the samples of a recording say by themselves: how its first channel moves, and how finely it was read.
+
+use crate::sim2real::{Measured, Recording, Typical};
+
+/// Value and rate of a channel at one row, as measured.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Estimate {
+    /// Value, in the channel's unit.
+    pub value: f64,
+    /// Rate [the channel's unit/s].
+    pub rate: f64,
+    /// Standard deviation of `rate`, in its unit; infinite where nothing tells it.
+    pub rate_std: f64,
+}
+
+/// Rows on either side that a local estimate uses.
+const REACH: usize = 7;
+
+/// A parabola by least squares through the samples of `channel` around `row`; where there is a channel `rate`, its sample.
+pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row: usize) -> Option<Estimate> {
+    let samples = &recording.channel(channel)?.samples;
+    let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(recording.len());
+    let points: Vec<(f64, f64)> =
+        rows.filter_map(|i| Some((recording.time[i] - recording.time[row], samples[i]?))).collect();
+    let scale = points.iter().map(|(t, _)| t.abs()).fold(0.0, f64::max);
+    if points.len() < 5 || scale <= 0.0 {
+        let (_, value) = points.first()?;
+        return Some(Estimate { value: *value, rate: 0.0, rate_std: f64::INFINITY });
+    }
+    let design = nalgebra::DMatrix::from_fn(points.len(), 3, |i, k| (points[i].0 / scale).powi(k as i32));
+    let values = nalgebra::DVector::from_iterator(points.len(), points.iter().map(|(_, y)| *y));
+    let inverse = design.tr_mul(&design).try_inverse()?;
+    let solution = &inverse * design.tr_mul(&values);
+    let spare = (points.len() - 3) as f64;
+    let variance = (&values - &design * &solution).norm_squared() / spare;
+    let measured = recording.channel(rate).and_then(|v| v.samples[row]);
+    Some(Estimate {
+        value: solution[0],
+        rate: measured.unwrap_or(solution[1] / scale),
+        rate_std: (variance * inverse[(1, 1)]).sqrt() / scale,
+    })
+}
+
+/// The same at every row; zeros where nothing was measured nearby.
+pub(super) fn motion<S>(recording: &Recording<S>, channel: &str, rate: &str) -> Vec<Estimate> {
+    (0..recording.len()).map(|row| local(recording, channel, rate, row).unwrap_or_default()).collect()
+}
+
+/// Typical sizes of a plant whose first channel is `channel` with the rate `rate`, driven by `commands` [unit of the
+/// command] through a gain of `gain` [effort per unit].
+pub(super) fn typical<S: AsRef<[f64]>>(recordings: &[Recording<S>], channel: &str, rate: &str, gain: f64) -> Typical {
+    let command = root_mean_square(recordings.iter().flat_map(|r| r.stimulus.as_ref().iter().copied()));
+    let seen: Vec<Estimate> =
+        recordings.iter().flat_map(|r| (0..r.len()).step_by(7).filter_map(|row| local(r, channel, rate, row))).collect();
+    let mean = seen.iter().map(|e| e.value).sum::<f64>() / seen.len().max(1) as f64;
+    let step = |r: &Recording<S>| r.channel(channel).map_or(0.0, rounding) * 12.0_f64.sqrt();
+    Typical {
+        command,
+        effort: command * gain.abs(),
+        output: root_mean_square(seen.iter().map(|e| e.value - mean)),
+        rate: root_mean_square(seen.iter().map(|e| e.rate)),
+        range: range(seen.iter().map(|e| e.value)),
+        resolution: recordings.iter().map(step).fold(0.0, f64::max),
+        duration: recordings.iter().filter_map(|r| Some(r.time.last()? - r.time.first()?)).fold(0.0, f64::max),
+        delay: None,
+    }
+}
+
+/// Standard deviation of the rounding of a sensor that counts in steps: `step / sqrt(12)` (Widrow & Kollár,
+/// *Quantization Noise* (2008), section 5.4), where nine in ten changes of the signal are whole multiples of the
+/// smallest; 0 elsewhere.
+pub(super) fn rounding(measured: &Measured) -> f64 {
+    let changes = measured.samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
+    let largest = changes.clone().fold(0.0, f64::max);
+    // Differences of rounded numbers are not quite whole multiples: the last bits differ.
+    let changes: Vec<f64> = changes.filter(|change| *change > 1e-9 * largest).collect();
+    let step = changes.iter().copied().fold(f64::INFINITY, f64::min);
+    let whole = changes.iter().filter(|change| ((**change / step) - (**change / step).round()).abs() < 1e-3).count();
+    if !changes.is_empty() && 10 * whole >= 9 * changes.len() { step / 12.0_f64.sqrt() } else { 0.0 }
+}
+
+/// Root mean square of what is finite; 0 where nothing is.
+pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.filter(|v| v.is_finite()).fold((0.0, 0), |(sum, count), v| (sum + v * v, count + 1));
+    (sum / f64::from(count.max(1))).sqrt()
+}
+
+/// Lowest and highest of the values; 0 where there is none.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values
+        .fold(None, |range, v| Some(range.map_or([v, v], |[low, high]: [f64; 2]| [low.min(v), high.max(v)])))
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_that_counts_is_no_better_than_its_step() {
+        let step = 2.0 * std::f64::consts::PI / 4096.0;
+        let position = |read: &dyn Fn(f64) -> f64| Measured {
+            channel: "position".into(),
+            unit: "rad".into(),
+            samples: (0..2_000).map(|i| Some(read(f64::from(i) * 4e-3))).collect(),
+        };
+        let counted = position(&|t| ((0.05 * (3.1 * t).sin()) / step).round() * step);
+        assert!((rounding(&counted) / (step / 12.0_f64.sqrt()) - 1.0).abs() < 1e-6, "{}", rounding(&counted));
+        assert_eq!(rounding(&position(&|t| 0.3 * t.sin())), 0.0);
+    }
+
+    #[test]
+    fn value_and_rate_are_those_of_the_parabola() {
+        let time: Vec<f64> = (0..40).map(|i| f64::from(i) * 0.01).collect();
+        let samples = time.iter().map(|t| Some(1.0 + 2.0 * t + 3.0 * t * t)).collect();
+        let measured = vec![Measured { channel: "q".into(), unit: "m".into(), samples }];
+        let recording = Recording { name: String::new(), time, stimulus: (), measured };
+        let middle = local(&recording, "q", "qd", 20).unwrap();
+        assert!((middle.value - 1.52).abs() < 1e-9 && (middle.rate - 3.2).abs() < 1e-9, "{middle:?}");
+        assert!(local(&recording, "none", "", 20).is_none());
+    }
+}

@@ -1,0 +1,130 @@
+//! A torque that comes back many times a turn: the motor's teeth, a pole pitch, a gear's teeth.
+
+use std::f64::consts::TAU;
+
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Scene, Seed, Site, Thetas, Tick, Typical};
+
+/// `sine sin(counts q) + cosine cos(counts q)`; in the form `per_length`, of a linear axis, with `wave_number` for
+/// `counts`.
+///
+/// Source: Hanselman, *Brushless Permanent Magnet Motor Design* (2003), chapter 4: cogging repeats with the least common
+/// multiple of slots and poles; 4 to 200 times a turn in motors as they are built, times the ratio of a gear behind them.
+#[derive(Debug, Clone, Copy)]
+pub struct Cogging;
+
+/// Counts a turn at which fits begin: each whole one up to 24, which the motion of a turn or less can tell from its
+/// neighbours; above, those of usual slots and poles.
+const COUNTS: [f64; 41] = [
+    4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0, 24.0,
+    26.0, 28.0, 30.0, 32.0, 36.0, 40.0, 42.0, 48.0, 50.0, 54.0, 60.0, 64.0, 72.0, 80.0, 84.0, 96.0, 100.0, 120.0, 144.0,
+    200.0,
+];
+/// Waves on the way an axis goes at which fits begin: up to this many.
+const WAVES: u32 = 40;
+
+impl<P: Mover> Mechanism<P> for Cogging {
+    fn about(&self) -> About {
+        About {
+            name: "cogging",
+            site: Site::Plant,
+            title: "cogging",
+            law: "inertia a = ... + sine sin(counts q) + cosine cos(counts q)",
+            source: "Hanselman, Brushless Permanent Magnet Motor Design (2003), ch. 4",
+            remedy: "feed the torque of the motor's teeth forward by position, or add it to the simulator",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let amplitude = |name| Parameter::new(name, "N m", 0.0).starting_at(&[0.05 * typical.effort]).proportional();
+        let waves = TAU / (typical.range[1] - typical.range[0]).max(1e-9);
+        let numbers: Vec<f64> = (2..=WAVES).map(|n| f64::from(n) * waves).collect();
+        let number = Parameter::new("wave_number", "1/rad", waves).within(0.5 * waves.min(1.0), f64::INFINITY);
+        let counts = Parameter::new("counts", "", 4.0).within(3.0, f64::INFINITY);
+        vec![
+            Form { name: "per_turn", parameters: vec![amplitude("sine"), amplitude("cosine"), counts.starting_at(&COUNTS)] },
+            Form {
+                name: "per_length",
+                parameters: vec![amplitude("sine"), amplitude("cosine"), number.starting_at(&numbers)],
+            },
+        ]
+    }
+
+    fn applies(&self, form: usize, plant: &P, _stimulus: &P::Stimulus) -> bool {
+        let turns = Plant::unit(plant, "rad") == "rad";
+        turns == (form == 0)
+    }
+
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        Box::new(Teeth { sine: thetas.row(0).to_vec(), cosine: thetas.row(1).to_vec(), number: thetas.row(2).to_vec() })
+    }
+}
+
+struct Teeth {
+    sine: Vec<f64>,
+    cosine: Vec<f64>,
+    number: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for Teeth {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let parameters = self.sine.iter().zip(&self.cosine).zip(&self.number);
+        for ((effect, state), ((sine, cosine), number)) in effects.iter_mut().zip(scene.states).zip(parameters) {
+            if *sine == 0.0 && *cosine == 0.0 {
+                continue;
+            }
+            let motion = P::motion(state);
+            let (s, c) = (number * (motion.position + 0.5 * tick.step * motion.velocity)).sin_cos();
+            P::push(effect).effort += sine * s + cosine * c;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::mechanism::trial::Trial;
+    use crate::robot::{Axis, Commands, Joint};
+
+    /// At rest under a constant drive, the teeth balance it: `drive + sine sin(n q) + cosine cos(n q) = 0` where it is
+    /// stable.
+    #[test]
+    fn it_rests_where_the_teeth_balance_the_drive() {
+        let trial = Trial { parameters: [0.1, 1.0, 0.0, 1.0], position: 0.02, velocity: 0.0, step: 1e-3 };
+        let (sine, cosine, counts, drive) = (-0.3, 0.2, 12.0, 0.1);
+        let rest = trial.follow(&Cogging, 0, &[sine, cosine, counts], &vec![drive; 20_000])[19_999].position;
+        // As one wave: amplitude sin(n q + phase).
+        let amplitude = f64::hypot(sine, cosine);
+        let phase = cosine.atan2(sine);
+        let stable = (std::f64::consts::PI - (-drive / amplitude).asin() - phase) / counts;
+        let turns = ((rest - stable) / (TAU / counts)).round();
+        assert!((rest - stable - turns * TAU / counts).abs() < 1e-9, "{rest}, {stable}");
+    }
+
+    /// Energy is kept: half the inertia times velocity squared, and the potential of the teeth.
+    #[test]
+    fn it_is_a_potential() {
+        let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.1, velocity: 2.0, step: 1e-3 };
+        let (sine, cosine, counts) = (0.05, -0.02, 24.0);
+        let motion = trial.follow(&Cogging, 0, &[sine, cosine, counts], &vec![0.0; 5_000]);
+        let energy = |m: &crate::robot::Motion| {
+            let (s, c) = (counts * m.position).sin_cos();
+            0.05 * m.velocity * m.velocity + (sine * c - cosine * s) / counts
+        };
+        let first = energy(&motion[0]);
+        assert!(motion.iter().all(|m| (energy(m) / first - 1.0).abs() < 1e-3));
+        let fastest = motion.iter().map(|m| m.velocity).fold(0.0, f64::max);
+        assert!(fastest > 2.005, "{fastest}");
+    }
+
+    #[test]
+    fn what_turns_has_counts_and_what_slides_a_wave_number() {
+        for (axis, form) in [(Axis::Rotary, 0), (Axis::Linear, 1)] {
+            let joint = Joint::new(axis, [1.0; 4], [0.1; 4]);
+            for other in [0, 1] {
+                assert_eq!(Mechanism::<Joint>::applies(&Cogging, other, &joint, &Commands::default()), form == other);
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! A transmission that gives: a harmonic drive, a long shaft, a belt.
+
+use super::second_mass::{Coupling, Load, SecondMass, as_one};
+use super::spring::spring_inertia;
+use crate::robot::{Motion, Mover};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+
+/// Motor and link, held together by a spring that gives by `compliance` and by a damper of `damping_ratio` times the
+/// critical damping of the two against each other. The motor is driven and has the joint's viscous friction, gravity pulls
+/// at the link. In the form `on_motor` the encoder is on the motor and the link has `link_share` of the inertia; in the form
+/// `on_link` the encoder is on the link and the motor has `motor_share`.
+///
+/// Source: Spong, "Modeling and control of elastic joint robots", ASCE Journal of Dynamic Systems, Measurement, and Control
+/// 109 (1987); De Luca & Book, "Robots with flexible elements", *Springer Handbook of Robotics* (2016), section 11.1.
+#[derive(Debug, Clone, Copy)]
+pub struct Compliance;
+
+impl<P: Mover> Mechanism<P> for Compliance {
+    fn about(&self) -> About {
+        About {
+            name: "compliance",
+            site: Site::Plant,
+            title: "a compliant transmission",
+            law: "motor and link apart, torque between them: deflection / compliance + damping times its rate",
+            source: "Spong, Journal of Dynamic Systems, Measurement, and Control 109 (1987)",
+            remedy: "model motor and link as two masses with a spring between them, or keep below their resonance",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let parameters = |share| {
+            // Deflections under the usual effort, as fractions of the usual motion.
+            let starts = [0.005, 0.03, 0.2].map(|fraction| fraction * typical.output / typical.effort.max(1e-12));
+            vec![
+                Parameter::new("compliance", "rad/(N m)", 0.0).within(0.0, f64::INFINITY).starting_at(&starts),
+                Parameter::new(share, "", 0.5).within(0.02, 0.98).starting_at(&[0.3, 0.8]),
+                Parameter::new("damping_ratio", "", 0.0).within(0.0, 5.0).starting_at(&[0.05]),
+            ]
+        };
+        vec![
+            Form { name: "on_motor", parameters: parameters("link_share") },
+            Form { name: "on_link", parameters: parameters("motor_share") },
+        ]
+    }
+
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let shaft = Shaft {
+            compliance: thetas.row(0).to_vec(),
+            share: thetas.row(1).to_vec(),
+            damping_ratio: thetas.row(2).to_vec(),
+            second: vec![None; thetas.lanes()],
+        };
+        if form == 0 { Box::new(OnMotor(shaft)) } else { Box::new(OnLink(shaft)) }
+    }
+}
+
+struct Shaft {
+    compliance: Vec<f64>,
+    /// Of the inertia, that of the mass without an encoder.
+    share: Vec<f64>,
+    damping_ratio: Vec<f64>,
+    second: Vec<Option<SecondMass>>,
+}
+
+/// What acts on the mass without an encoder, and what the plant takes to act on the one with it.
+struct Sides {
+    /// On the mass without an encoder, were it there [N m].
+    second: f64,
+    /// What the plant lets act on the one with an encoder, and does not act there [N m].
+    misplaced: f64,
+    /// Damping of the mass without an encoder, which the plant lets act on the other [N m s/rad].
+    damping: f64,
+}
+
+impl Shaft {
+    /// One step of all lanes; `sides` says for a lane and its state where the mass without an encoder is in the middle of
+    /// the step what acts on which mass, `at_rest` what acts on the first and the second were they one.
+    fn turn<P: Mover>(
+        &mut self,
+        tick: Tick,
+        scene: &Scene<'_, P>,
+        effects: &mut [P::Effect],
+        sides: impl Fn(usize, &P::State, f64) -> Sides,
+        at_rest: impl Fn(usize, &P::State) -> (f64, f64),
+    ) {
+        for (lane, (effect, state)) in effects.iter_mut().zip(scene.states).enumerate() {
+            let compliance = self.compliance[lane];
+            if compliance <= 0.0 {
+                continue;
+            }
+            let (first, whole, share) = (P::motion(state), P::inertia(scene.dynamics, lane, state), self.share[lane]);
+            let reduced = share * (1.0 - share) * whole;
+            let stiffness = 1.0 / compliance;
+            let second = match &mut self.second[lane] {
+                Some(second) => {
+                    second.arrive(first.velocity);
+                    second
+                }
+                None => {
+                    // At first the shaft is bent as it is where both move as one.
+                    let (on_first, on_second) = at_rest(lane, state);
+                    let bent = as_one(share, on_first, on_second) * compliance;
+                    self.second[lane].insert(SecondMass::starting(Motion { position: first.position - bent, ..first }))
+                }
+            };
+            let half = 0.5 * tick.step;
+            let midway = second.motion.position + half * second.motion.velocity;
+            let rate = first.velocity - second.motion.velocity;
+            let bend = first.position + half * first.velocity - midway;
+            let damping = 2.0 * self.damping_ratio[lane] * (stiffness * reduced).sqrt();
+            let coupling = Coupling {
+                effort: stiffness * bend + damping * rate,
+                rate: 0.5 * damping + spring_inertia(stiffness, reduced, tick.step) / tick.step,
+            };
+            let sides = sides(lane, state, midway);
+            let load = Load { inertia: share * whole, effort: sides.second, damping: sides.damping, dry_friction: 0.0 };
+            let (effort, inertia) = second.couple(tick.step, first.velocity, load, coupling);
+            let push = P::push(effect);
+            push.effort += effort - sides.misplaced;
+            push.inertia += inertia - share * whole;
+            push.damping -= sides.damping;
+        }
+    }
+}
+
+struct OnMotor(Shaft);
+
+impl<P: Mover> Law<P> for OnMotor {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let sides = |lane, state: &P::State, link: f64| {
+            let motor = P::motion(state);
+            let midway = motor.position + 0.5 * tick.step * motor.velocity;
+            Sides {
+                second: P::external(scene.dynamics, lane, state, link),
+                misplaced: P::external(scene.dynamics, lane, state, midway),
+                damping: 0.0,
+            }
+        };
+        self.0.turn(tick, scene, effects, sides, |lane, state| {
+            let external = P::external(scene.dynamics, lane, state, P::motion(state).position);
+            (P::drive(scene.dynamics, lane, state, &scene.commands[lane]), external)
+        });
+    }
+}
+
+struct OnLink(Shaft);
+
+impl<P: Mover> Law<P> for OnLink {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let drive = |lane, state: &P::State| P::drive(scene.dynamics, lane, state, &scene.commands[lane]);
+        let sides = |lane, state: &P::State, _| {
+            let effort = drive(lane, state);
+            Sides { second: effort, misplaced: effort, damping: P::damping(scene.dynamics, lane, state) }
+        };
+        self.0.turn(tick, scene, effects, sides, |lane, state| {
+            (P::external(scene.dynamics, lane, state, P::motion(state).position), drive(lane, state))
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::mechanism::trial::Trial;
+
+    /// Free of damping and gravity the two masses swing against each other with `sqrt(stiffness / reduced inertia)`, about a
+    /// centre that moves as the drive has it.
+    #[test]
+    fn the_resonance_is_that_of_two_masses() {
+        let (inertia, share, stiffness) = (0.1, 0.3, 60.0);
+        for (form, seen) in [(0, share), (1, 1.0 - share)] {
+            let trial = Trial { parameters: [inertia, 0.0, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
+            let share = if form == 0 { share } else { 1.0 - seen };
+            // A kick of one row at a start without bend, and then nothing.
+            let mut commands = vec![0.0; 4_000];
+            commands[1] = 5.0;
+            let motion = trial.follow(&Compliance, form, &[1.0 / stiffness, share, 0.0], &commands);
+            let mean = 5.0 * 1e-3 / inertia;
+            let swing: Vec<f64> = motion.iter().map(|m| m.velocity - mean).collect();
+            let upward: Vec<f64> = (3..swing.len())
+                .filter(|k| swing[k - 1] < 0.0 && swing[*k] >= 0.0)
+                .map(|k| (k as f64 - swing[k] / (swing[k] - swing[k - 1])) * 1e-3)
+                .collect();
+            let period = (upward[upward.len() - 1] - upward[0]) / (upward.len() - 1) as f64;
+            let expected = std::f64::consts::TAU * (share * (1.0 - share) * inertia / stiffness).sqrt();
+            assert!((period / expected - 1.0).abs() < 1e-4, "form {form}: {period} s, expected {expected} s");
+        }
+    }
+
+    /// A weight bends the shaft by `compliance` times its torque: the motor holds further up than the link.
+    #[test]
+    fn a_weight_bends_the_shaft() {
+        let (weight, compliance) = (2.0, 0.02);
+        let trial = Trial { parameters: [0.1, 0.5, weight, 1.0], position: 0.9, velocity: 0.0, step: 1e-3 };
+        let drive: f64 = 1.2;
+        let commands = vec![drive; 30_000];
+        let link = (drive / weight).asin();
+        let on_link = trial.follow(&Compliance, 1, &[compliance, 0.5, 0.3], &commands)[29_999].position;
+        assert!((on_link - link).abs() < 1e-9, "{on_link}, {link}");
+        let on_motor = trial.follow(&Compliance, 0, &[compliance, 0.5, 0.3], &commands)[29_999].position;
+        assert!((on_motor - link - compliance * drive).abs() < 1e-9, "{on_motor}");
+    }
+
+    /// The stiffer the shaft, the more it is the joint without one, and no stiffness is too much.
+    #[test]
+    fn a_stiff_shaft_is_none() {
+        let trial = Trial { parameters: [0.11, 0.25, 2.7, 1.0], position: 0.3, velocity: 0.0, step: 1e-3 };
+        let commands: Vec<f64> = (0..5_000).map(|k| 2.0 * (3.0 * f64::from(k) * 1e-3).sin()).collect();
+        for form in [0, 1] {
+            let at = |compliance: f64| trial.follow(&Compliance, form, &[compliance, 0.6, 0.05], &commands);
+            let plain = at(0.0);
+            for compliance in [1e-9, 1e-6, 1e-4] {
+                let stiff = at(compliance);
+                let worst = stiff.iter().zip(&plain).map(|(a, b)| (a.position - b.position).abs()).fold(0.0, f64::max);
+                assert!(worst < 2e-6 + 6.0 * compliance, "form {form}, {compliance}: {worst} rad");
+            }
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! A mechanical stop at the end of the way.
+
+use super::spring::Wall;
+use crate::robot::{Mover, Push};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+
+/// Beyond `upper`, `-(stiffness (q - upper) + damping v)`, never pulling back; likewise below `lower`; or both. The damping
+/// is `2 damping_ratio sqrt(stiffness inertia)`.
+///
+/// Source: Kelvin and Voigt's body as a contact, as in Gilardi & Sharf, "Literature survey of contact dynamics modelling",
+/// Mechanism and Machine Theory 37 (2002), section 3.
+#[derive(Debug, Clone, Copy)]
+pub struct EndStop;
+
+impl<P: Mover> Mechanism<P> for EndStop {
+    fn about(&self) -> About {
+        About {
+            name: "end_stop",
+            site: Site::Plant,
+            title: "an end stop",
+            law: "inertia a = ... - stiffness (q - upper) - damping v beyond upper; likewise below lower",
+            source: "Gilardi & Sharf, Mechanism and Machine Theory 37 (2002), section 3",
+            remedy: "keep the motion off the stop, or give the joint of the simulator its limits",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let [lowest, highest] = typical.range;
+        let span = (highest - lowest).max(1e-9);
+        let within = |fractions: &[f64], end: f64, inwards: f64| -> Vec<f64> {
+            fractions.iter().map(|fraction| end + inwards * fraction * span).collect()
+        };
+        let upper =
+            |fractions: &[f64]| Parameter::new("upper", "rad", highest).starting_at(&within(fractions, highest, -1.0));
+        let lower = |fractions: &[f64]| Parameter::new("lower", "rad", lowest).starting_at(&within(fractions, lowest, 1.0));
+        let stiffness = || {
+            let starts = [10.0, 100.0, 1000.0].map(|factor| factor * typical.effort / span);
+            Parameter::new("stiffness", "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)
+        };
+        let ratio = || Parameter::new("damping_ratio", "", 0.0).within(0.0, 10.0).starting_at(&[0.5]);
+        let (one, two) = ([0.01, 0.05, 0.15], [0.01, 0.1]);
+        vec![
+            Form { name: "upper", parameters: vec![upper(&one), stiffness(), ratio()] },
+            Form { name: "lower", parameters: vec![lower(&one), stiffness(), ratio()] },
+            Form { name: "both", parameters: vec![lower(&two), upper(&two), stiffness(), ratio()] },
+        ]
+    }
+
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let never = |value| vec![value; thetas.lanes()];
+        let (lower, upper) = match form {
+            0 => (never(f64::NEG_INFINITY), thetas.row(0).to_vec()),
+            1 => (thetas.row(0).to_vec(), never(f64::INFINITY)),
+            _ => (thetas.row(0).to_vec(), thetas.row(1).to_vec()),
+        };
+        let at = if form == 2 { 2 } else { 1 };
+        Box::new(Stops { lower, upper, stiffness: thetas.row(at).to_vec(), damping_ratio: thetas.row(at + 1).to_vec() })
+    }
+}
+
+struct Stops {
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    stiffness: Vec<f64>,
+    damping_ratio: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for Stops {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let limits = self.lower.iter().zip(&self.upper);
+        for (lane, ((effect, state), (lower, upper))) in effects.iter_mut().zip(scene.states).zip(limits).enumerate() {
+            let motion = P::motion(state);
+            let end = motion.position + tick.step * motion.velocity;
+            let (least, most) = (motion.position.min(end), motion.position.max(end));
+            if most <= *upper && least >= *lower {
+                continue;
+            }
+            let wall = Wall {
+                stiffness: self.stiffness[lane],
+                damping_ratio: self.damping_ratio[lane],
+                inertia: P::inertia(scene.dynamics, lane, state),
+            };
+            let push = P::push(effect);
+            meet(&wall, motion.position - upper, motion.velocity, tick.step, -1.0, push);
+            meet(&wall, lower - motion.position, -motion.velocity, tick.step, 1.0, push);
+        }
+    }
+}
+
+fn meet(wall: &Wall, depth: f64, rate: f64, step: f64, off: f64, push: &mut Push) {
+    if let Some(contact) = wall.meet(depth, rate, step) {
+        push.effort += off * contact.effort;
+        push.damping += contact.damping;
+        push.inertia += contact.inertia;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::mechanism::trial::Trial;
+
+    /// Under a constant drive it comes to rest where the stop's spring balances it, whatever the stiffness and the side.
+    #[test]
+    fn it_rests_where_the_stop_balances_the_drive() {
+        let trial = Trial { parameters: [0.1, 0.2, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
+        for stiffness in [50.0, 2e3, 1e5, 1e7] {
+            for (form, values, drive) in [
+                (0, vec![0.5, stiffness, 0.3], 1.5),
+                (1, vec![-0.5, stiffness, 0.3], -1.5),
+                (2, vec![-0.5, 0.5, stiffness, 0.3], -1.5),
+            ] {
+                let motion = trial.follow(&EndStop, form, &values, &vec![drive; 20_000]);
+                let expected = f64::signum(drive) * (0.5 + 1.5 / stiffness);
+                let rest = motion[19_999];
+                assert!((rest.position - expected).abs() < 1e-7, "{stiffness}: {} not {expected}", rest.position);
+                assert!(
+                    motion
+                        .iter()
+                        .all(|m| m.position.abs() < 0.5 + 2.0 * (0.1 / stiffness).sqrt() * 6.0 + 2.0 * 1.5 / stiffness)
+                );
+            }
+        }
+    }
+
+    /// Without damping it bounces off as fast as it came; with damping, as fine steps of the same contact have it.
+    #[test]
+    fn it_bounces_off_as_the_closed_form_has_it() {
+        let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.0, velocity: 1.0, step: 1e-3 };
+        for ratio in [0.0_f64, 0.1, 0.3, 0.6] {
+            let motion = trial.follow(&EndStop, 0, &[0.25, 400.0, ratio], &vec![0.0; 600]);
+            let expected = bounce(ratio);
+            let off = -motion[599].velocity;
+            assert!((off - expected).abs() < 0.01, "{ratio}: {off}, expected {expected}");
+        }
+    }
+
+    /// Speed after the contact of a body of unit mass and speed with a wall of unit frequency, by fine steps.
+    fn bounce(ratio: f64) -> f64 {
+        let (mut x, mut v, h) = (0.0, 1.0, 1e-5);
+        loop {
+            let force = |x: f64, v: f64| -x - 2.0 * ratio * v;
+            let (half_x, half_v) = (x + 0.5 * h * v, v + 0.5 * h * force(x, v));
+            (x, v) = (x + h * half_v, v + h * force(half_x, half_v));
+            if force(x, v) >= 0.0 && v < 0.0 {
+                return -v;
+            }
+        }
+    }
+
+    /// The motion after the impact moves evenly with where the stop is.
+    #[test]
+    fn the_stop_has_a_derivative() {
+        let trial = Trial { parameters: [0.1, 0.2, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
+        let drive: Vec<f64> = (0..2_000).map(|k| 1.5 * (3.0 * f64::from(k) * 1e-3).sin()).collect();
+        let at = |upper: f64| trial.follow(&EndStop, 0, &[upper, 500.0, 0.3], &drive)[1_999].position;
+        let wide = (at(0.31) - at(0.29)) / 0.02;
+        for k in 0..20 {
+            let upper = 0.3 + f64::from(k) * 1.3e-4;
+            let narrow = (at(upper + 2e-5) - at(upper - 2e-5)) / 4e-5;
+            assert!((narrow - wide).abs() < 0.15 * wide.abs(), "{upper}: {narrow}, {wide} over a wider step");
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Dry friction of gears, which grows with the load they carry.
+
+use super::stribeck_friction::falling;
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+
+/// Dry friction of `torque + load |drive - external|`, where `drive` is the motor's effort and `external` that of gravity;
+/// in the form `stribeck`, `torque + load |drive - external| + exp(-(v / stribeck_velocity)^2) (excess + load_excess |drive -
+/// external|)`; in the form `directional`, `torque + |motor_load drive - external_load external|`, as where gears pass a
+/// load on more easily one way than the other.
+///
+/// Source: Duclusaud, Passault, Padois & Ly, "Extended friction models for the physics simulation of servo actuators",
+/// arXiv 2410.08650 (2024): models M3 and M4, and the direction of M5 (there with Stribeck's effect).
+#[derive(Debug, Clone, Copy)]
+pub struct LoadFriction;
+
+impl<P: Mover> Mechanism<P> for LoadFriction {
+    fn about(&self) -> About {
+        About {
+            name: "load_friction",
+            site: Site::Plant,
+            title: "load-dependent friction",
+            law: "inertia a = ... - (torque + load |drive - external|) sign(v); holds as much at rest",
+            source: "Duclusaud, Passault, Padois & Ly, arXiv 2410.08650 (2024), models M3 to M5",
+            remedy: "give the gears friction that grows with the load, and identify it at several loads",
+            contains: &["coulomb_friction", "stribeck_friction"],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let torques = |name, fraction: f64| {
+            Parameter::new(name, "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&[fraction * typical.effort])
+        };
+        // At a share of 1 no load could move the gears.
+        let loads = |name, starts: &[f64]| Parameter::new(name, "", 0.0).within(0.0, 1.0).starting_at(starts);
+        let rate = typical.rate.max(1e-9);
+        let velocity = Parameter::new("stribeck_velocity", "rad/s", rate)
+            .within(1e-3 * rate.min(1.0), f64::INFINITY)
+            .starting_at(&[0.05, 0.3].map(|fraction| fraction * rate));
+        vec![
+            Form { name: "even", parameters: vec![torques("torque", 0.05), loads("load", &[0.05, 0.2])] },
+            Form {
+                name: "stribeck",
+                parameters: vec![
+                    torques("torque", 0.05),
+                    loads("load", &[0.1]),
+                    torques("excess", 0.05),
+                    loads("load_excess", &[0.1]),
+                    velocity,
+                ],
+            },
+            Form {
+                name: "directional",
+                parameters: vec![
+                    torques("torque", 0.05),
+                    loads("motor_load", &[0.05, 0.2]),
+                    loads("external_load", &[0.05, 0.2]),
+                ],
+            },
+        ]
+    }
+
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let row = |k| thetas.row(k).to_vec();
+        match form {
+            0 => Box::new(Gears { torque: row(0), motor: row(1), external: row(1) }),
+            1 => Box::new(StribeckGears {
+                sliding: Gears { torque: row(0), motor: row(1), external: row(1) },
+                sticking: Gears { torque: row(2), motor: row(3), external: row(3) },
+                velocity: row(4),
+            }),
+            _ => Box::new(Gears { torque: row(0), motor: row(1), external: row(2) }),
+        }
+    }
+}
+
+struct Gears {
+    torque: Vec<f64>,
+    motor: Vec<f64>,
+    external: Vec<f64>,
+}
+
+impl Gears {
+    /// Friction in lane `lane` under these efforts of motor and gravity [N m].
+    #[inline]
+    fn friction(&self, lane: usize, drive: f64, external: f64) -> f64 {
+        self.torque[lane] + (self.motor[lane] * drive - self.external[lane] * external).abs()
+    }
+}
+
+/// Efforts of motor and gravity, in the middle of the step [N m].
+#[inline]
+fn efforts<P: Mover>(tick: Tick, scene: &Scene<'_, P>, lane: usize, state: &P::State) -> (f64, f64) {
+    let motion = P::motion(state);
+    let midway = motion.position + 0.5 * tick.step * motion.velocity;
+    let external = P::external(scene.dynamics, lane, state, midway);
+    (P::drive(scene.dynamics, lane, state, &scene.commands[lane]), external)
+}
+
+impl<P: Mover> Law<P> for Gears {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        for (lane, (effect, state)) in effects.iter_mut().zip(scene.states).enumerate() {
+            let (drive, external) = efforts(tick, scene, lane, state);
+            P::push(effect).dry_friction += self.friction(lane, drive, external);
+        }
+    }
+}
+
+struct StribeckGears {
+    sliding: Gears,
+    sticking: Gears,
+    velocity: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for StribeckGears {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        for (lane, (effect, state)) in effects.iter_mut().zip(scene.states).enumerate() {
+            let (drive, external) = efforts(tick, scene, lane, state);
+            let scale = self.velocity[lane];
+            let ratio = P::motion(state).velocity.abs() / scale;
+            let sticking = (-ratio * ratio).exp() * self.sticking.friction(lane, drive, external);
+            let inertia = P::inertia(scene.dynamics, lane, state);
+            let push = P::push(effect);
+            push.dry_friction += self.sliding.friction(lane, drive, external) + sticking;
+            push.inertia -= falling(2.0 * ratio / scale * sticking, inertia, tick.step);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::mechanism::trial::Trial;
+
+    /// On a linear axis, or a joint that nothing weighs on, it takes a share of the drive: `a = drive (1 - load) / inertia`.
+    #[test]
+    fn without_gravity_it_takes_a_share_of_the_drive() {
+        let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
+        for (form, values) in [(0, vec![0.0, 0.2]), (1, vec![0.0, 0.2, 0.0, 0.0, 1.0]), (2, vec![0.0, 0.2, 0.7])] {
+            let motion = trial.follow(&LoadFriction, form, &values, &[0.5; 1_001]);
+            assert!((motion[1_000].velocity - 0.5 * 0.8 / 0.1).abs() < 1e-9, "form {form}");
+        }
+    }
+
+    /// A weight held at right angles: the least drive that lifts it and the greatest that lets it sink, as the law has them.
+    #[test]
+    fn it_holds_a_weight_between_the_two_drives_of_the_law() {
+        let (weight, torque) = (2.0, 0.1);
+        let gravity = -weight;
+        for (form, values, motor, external) in [
+            (0, vec![torque, 0.1], 0.1, 0.1),
+            (1, vec![0.06, 0.07, 0.04, 0.03, 0.2], 0.1, 0.1),
+            (2, vec![torque, 0.05, 0.2], 0.05, 0.2),
+        ] {
+            // drive + gravity = +-(torque + motor drive - external gravity), the drive being upward.
+            let lifts = (torque - external * gravity - gravity) / (1.0 - motor);
+            let sinks = (-torque + external * gravity - gravity) / (1.0 + motor);
+            let trial = Trial {
+                parameters: [0.1, 0.0, weight, 1.0],
+                position: std::f64::consts::FRAC_PI_2,
+                velocity: 0.0,
+                step: 1e-3,
+            };
+            for (drive, way) in [(lifts + 0.01, 1.0), (lifts - 0.01, 0.0), (sinks + 0.01, 0.0), (sinks - 0.01, -1.0)] {
+                let motion = trial.follow(&LoadFriction, form, &values, &[drive; 200]);
+                let moved = motion[199].position - trial.position;
+                assert!(if way == 0.0 { moved == 0.0 } else { moved * way > 1e-5 }, "form {form}, {drive}: {moved}");
+            }
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Dry friction that is stronger in slow motion than in fast: a joint that sticks and slips.
+
+use crate::robot::Mover;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+
+/// Dry friction of `torque + excess exp(-(v / stribeck_velocity)^2)`; in the form `tustin`,
+/// `torque + excess exp(-|v| / tustin_velocity)`.
+///
+/// Source: Stribeck, "Die wesentlichen Eigenschaften der Gleit- und Rollenlager", VDI-Zeitschrift 46 (1902); the
+/// exponentials are Bo & Pavelescu's, Wear 82 (1982), and Tustin's, Journal of the IEE 94 (1947), as in Armstrong-Hélouvry,
+/// Dupont & Canudas de Wit, Automatica 30 (1994), section 2.
+#[derive(Debug, Clone, Copy)]
+pub struct StribeckFriction;
+
+impl<P: Mover> Mechanism<P> for StribeckFriction {
+    fn about(&self) -> About {
+        About {
+            name: "stribeck_friction",
+            site: Site::Plant,
+            title: "Stribeck friction",
+            law: "inertia a = ... - (torque + excess exp(-(v / stribeck_velocity)^2)) sign(v); holds as much at rest",
+            source: "Stribeck (1902); Bo & Pavelescu, Wear 82 (1982); Tustin, Journal of the IEE 94 (1947)",
+            remedy: "add friction that falls with speed to the joint, keep out of slow motion, or compensate it there",
+            contains: &["coulomb_friction"],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let parameters = |velocity| {
+            let torques = |name, fractions: &[f64]| {
+                let starts: Vec<f64> = fractions.iter().map(|fraction| fraction * typical.effort).collect();
+                Parameter::new(name, "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)
+            };
+            let rate = typical.rate.max(1e-9);
+            let velocities = [0.03, 0.15, 0.5].map(|fraction| fraction * rate);
+            vec![
+                torques("torque", &[0.05, 0.2]),
+                torques("excess", &[0.1]),
+                Parameter::new(velocity, "rad/s", rate).within(1e-3 * rate.min(1.0), f64::INFINITY).starting_at(&velocities),
+            ]
+        };
+        vec![
+            Form { name: "gaussian", parameters: parameters("stribeck_velocity") },
+            Form { name: "tustin", parameters: parameters("tustin_velocity") },
+        ]
+    }
+
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let friction = Friction {
+            torque: thetas.row(0).to_vec(),
+            excess: thetas.row(1).to_vec(),
+            fading: thetas.row(2).iter().map(|velocity| 1.0 / velocity).collect(),
+        };
+        if form == 0 { Box::new(Gaussian(friction)) } else { Box::new(Tustin(friction)) }
+    }
+}
+
+struct Friction {
+    torque: Vec<f64>,
+    excess: Vec<f64>,
+    /// One over the velocity [s/rad].
+    fading: Vec<f64>,
+}
+
+impl Friction {
+    /// `fading` gives the part of the excess that is left at a speed in units of its parameter, and minus its derivative.
+    fn add<P: Mover>(
+        &self,
+        tick: Tick,
+        scene: &Scene<'_, P>,
+        effects: &mut [P::Effect],
+        fading: impl Fn(f64) -> (f64, f64),
+    ) {
+        let parameters = self.torque.iter().zip(&self.excess).zip(&self.fading);
+        let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();
+        for (lane, ((effect, state), ((torque, excess), per_velocity))) in lanes {
+            let (left, fall) = fading(P::motion(state).velocity.abs() * per_velocity);
+            let push = P::push(effect);
+            push.dry_friction += torque + excess * left;
+            let inertia = P::inertia(scene.dynamics, lane, state);
+            push.inertia -= falling(excess * per_velocity * fall, inertia, tick.step);
+        }
+    }
+}
+
+/// Inertia that dry friction seems to take off which falls by `fall` [N m s/rad] with speed.
+///
+/// Dry friction is that of the start of a step; that it falls on the way counts like an inertia that is not there: with it
+/// the friction is that of the middle of the step, to second order. A fall too steep for the step to follow counts for less.
+#[inline]
+pub(super) fn falling(fall: f64, inertia: f64, step: f64) -> f64 {
+    (0.5 * step * fall).min(0.25 * inertia)
+}
+
+struct Gaussian(Friction);
+
+impl<P: Mover> Law<P> for Gaussian {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.0.add(tick, scene, effects, |ratio| {
+            let left = (-ratio * ratio).exp();
+            (left, 2.0 * ratio * left)
+        });
+    }
+}
+
+struct Tustin(Friction);
+
+impl<P: Mover> Law<P> for Tustin {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.0.add(tick, scene, effects, |ratio| {
+            let left = (-ratio).exp();
+            (left, left)
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::mechanism::trial::Trial;
+
+    /// In steady motion the drive balances viscous and dry friction, which falls as the motion gets faster.
+    #[test]
+    fn a_steady_motion_meets_the_friction_of_its_speed_on_a_falling_curve() {
+        let (torque, excess, scale) = (0.1, 0.2, 0.4);
+        for form in [0, 1] {
+            for speed in [0.2_f64, 0.6, 1.5] {
+                let fading = if form == 0 { (-(speed / scale).powi(2)).exp() } else { (-speed / scale).exp() };
+                let level = torque + excess * fading;
+                // Viscous friction steep enough that the motion is stable on the falling part.
+                let viscous = 1.0;
+                let drive = level + viscous * speed;
+                let trial = Trial { parameters: [0.1, viscous, 0.0, 1.0], position: 0.0, velocity: speed, step: 1e-3 };
+                let motion = trial.follow(&StribeckFriction, form, &[torque, excess, scale], &vec![drive; 4_000]);
+                assert!((motion[3_999].velocity - speed).abs() < 1e-6, "{form} {speed}: {}", motion[3_999].velocity);
+            }
+        }
+    }
+
+    /// What holds is `torque + excess`; once it slides, less than that keeps it going.
+    #[test]
+    fn it_takes_more_to_break_away_than_to_keep_going() {
+        let trial = Trial { parameters: [0.1, 0.01, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
+        let drive: Vec<f64> = (0..3_000)
+            .map(|k| {
+                if k < 1_000 {
+                    0.29
+                } else if k < 1_300 {
+                    0.5
+                } else {
+                    0.15
+                }
+            })
+            .collect();
+        let motion = trial.follow(&StribeckFriction, 0, &[0.1, 0.2, 0.1], &drive);
+        assert!(motion[..1_000].iter().all(|m| m.position == 0.0));
+        assert!(motion[2_999].velocity > 0.5);
+    }
+}

@@ -1,0 +1,119 @@
+//! A sensor whose zero moves with time.
+
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+
+/// `y -> y + rate t`, on the plant's first channel; in the form `settling`, `y -> y + offset (1 - exp(-t / time_constant))`, as
+/// of electronics that warm up.
+///
+/// `t` is the recording's own clock: the zero is right at its 0, wherever a run starts. Recordings of one twin with a drift
+/// should count from one beginning, and none from an epoch far away. Before 0 nothing has settled.
+///
+/// Source: instrumental drift, JCGM 200:2012, *International Vocabulary of Metrology*, 4.21.
+#[derive(Debug, Clone, Copy)]
+pub struct Drift;
+
+impl<P: Plant> Mechanism<P> for Drift
+where
+    P::Observation: AsMut<[f64]>,
+{
+    fn about(&self) -> About {
+        About {
+            name: "drift",
+            site: Site::Observation,
+            title: "a drift of the sensor's zero",
+            law: "y -> y + rate t; settling: y -> y + offset (1 - exp(-t / time_constant))",
+            source: "instrumental drift, JCGM 200:2012, International Vocabulary of Metrology, 4.21",
+            remedy: "let the sensor warm up, or home the axis again from time to time; subtract the drift",
+            contains: &["bias"],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let duration = if typical.duration > 0.0 { typical.duration } else { 1.0 };
+        let offsets = [0.1, -0.1].map(|part| part * typical.output);
+        let rates = offsets.map(|offset| offset / duration);
+        let times = [0.05, 0.3].map(|part| part * duration);
+        let time = Parameter::new("time_constant", "s", f64::INFINITY).within(0.0, f64::INFINITY);
+        vec![
+            Form {
+                name: "linear",
+                parameters: vec![Parameter::new("rate", "output/s", 0.0).starting_at(&rates).proportional()],
+            },
+            Form {
+                name: "settling",
+                parameters: vec![
+                    Parameter::new("offset", "output", 0.0).starting_at(&offsets).proportional(),
+                    time.starting_at(&times),
+                ],
+            },
+        ]
+    }
+
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let size = thetas.row(0).to_vec();
+        if form == 0 { Box::new(Rate(size)) } else { Box::new(Settling { size, time_constant: thetas.row(1).to_vec() }) }
+    }
+}
+
+struct Rate(Vec<f64>);
+
+impl<P: Plant> Law<P> for Rate
+where
+    P::Observation: AsMut<[f64]>,
+{
+    fn sense(&mut self, time: f64, observations: &mut [P::Observation]) {
+        for (observation, rate) in observations.iter_mut().zip(&self.0) {
+            if let Some(y) = observation.as_mut().first_mut() {
+                *y += rate * time;
+            }
+        }
+    }
+}
+
+struct Settling {
+    size: Vec<f64>,
+    time_constant: Vec<f64>,
+}
+
+impl<P: Plant> Law<P> for Settling
+where
+    P::Observation: AsMut<[f64]>,
+{
+    fn sense(&mut self, time: f64, observations: &mut [P::Observation]) {
+        let since = time.max(0.0);
+        for ((observation, offset), tau) in observations.iter_mut().zip(&self.size).zip(&self.time_constant) {
+            if let Some(y) = observation.as_mut().first_mut() {
+                *y += offset * if *tau > 0.0 { -(-since / tau).exp_m1() } else { 1.0 };
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wire::{rows, sensed};
+    use super::*;
+
+    #[test]
+    fn the_zero_moves_with_the_recordings_own_clock() {
+        let rows = rows(400, 0.05, f64::sin);
+        let linear = &sensed(&Drift, 0, &[&[0.03]], 1, &rows)[0];
+        let settling = sensed(&Drift, 1, &[&[0.2, 4.0], &[0.2, 0.0], &[0.2, f64::INFINITY]], 1, &rows);
+        for (i, (t, [y, _])) in rows.iter().enumerate() {
+            assert!((linear[i][0] - y - 0.03 * t).abs() < 1e-15);
+            assert!((settling[0][i][0] - y - 0.2 * (1.0 - (-t / 4.0).exp())).abs() < 1e-14);
+            assert!((settling[1][i][0] - y - 0.2).abs() < 1e-15);
+            assert_eq!(settling[2][i][0], *y);
+        }
+        // A run that starts in the middle sees the same.
+        assert_eq!(sensed(&Drift, 0, &[&[0.03]], 1, &rows[200..])[0], linear[200..]);
+        assert_eq!(sensed(&Drift, 1, &[&[0.2, 4.0]], 1, &rows[200..])[0], settling[0][200..]);
+        // Rates of change are no business of a zero.
+        assert!(linear.iter().all(|[_, rate]| *rate == 0.0));
+    }
+
+    #[test]
+    fn before_the_clocks_zero_nothing_has_settled() {
+        assert_eq!(sensed(&Drift, 1, &[&[0.2, 4.0]], 1, &[(-50.0, [1.0, 0.0])])[0], [[1.0, 0.0]]);
+    }
+}

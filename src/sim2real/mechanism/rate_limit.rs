@@ -1,0 +1,123 @@
+//! An actuator whose output cannot change as fast as its command.
+
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+
+/// `|du/dt| <= rate`: the output ramps towards a command that holds until it reaches it.
+///
+/// The ramp is solved exactly; what arrives in a tick is its mean over the tick, which is differentiable in the rate
+/// although ticks and the moments at which the command is reached do not fall together.
+///
+/// Source: Klyde, McRuer & Myers, "Pilot-induced oscillation analysis and prediction with actuator rate limiting", Journal
+/// of Guidance, Control, and Dynamics 20 (1997).
+#[derive(Debug, Clone, Copy)]
+pub struct RateLimit;
+
+impl<P: Plant> Mechanism<P> for RateLimit
+where
+    P::Command: AsMut<f64>,
+{
+    fn about(&self) -> About {
+        About {
+            name: "rate_limit",
+            site: Site::Command,
+            title: "a limit to how fast the actuator's output changes",
+            law: "|du/dt| <= rate",
+            source: "Klyde, McRuer & Myers, Journal of Guidance, Control, and Dynamics 20 (1997)",
+            remedy: "look for a ramp set in the drive; command no faster changes, or limit their rate in the simulator too",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        // From a typical command in a fiftieth of a second to one in a second.
+        let starts = [50.0, 15.0, 4.0, 1.0].map(|per_second| per_second * typical.command);
+        let rate = Parameter::new("rate", "command/s", f64::INFINITY).within(0.0, f64::INFINITY);
+        Form::only(vec![rate.starting_at(&starts)])
+    }
+
+    /// Long enough for a ramp of some steepness to reach its command, after which all that was before is forgotten.
+    fn memory(&self) -> f64 {
+        4.0
+    }
+
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        Box::new(Ramp { rate: thetas.row(0).to_vec(), output: vec![None; thetas.lanes()] })
+    }
+}
+
+struct Ramp {
+    rate: Vec<f64>,
+    /// What the actuator gives at the start of the tick; none before the first command, which it has already reached.
+    output: Vec<Option<f64>>,
+}
+
+impl<P: Plant> Law<P> for Ramp
+where
+    P::Command: AsMut<f64>,
+{
+    fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
+        for ((command, rate), output) in commands.iter_mut().zip(&self.rate).zip(&mut self.output) {
+            let u = command.as_mut();
+            let start = output.unwrap_or(*u);
+            let (way, most) = (*u - start, rate * tick.step);
+            if tick.step <= 0.0 || way == 0.0 {
+                *output = Some(*u);
+            } else if way.abs() >= most {
+                *output = Some(start + most.copysign(way));
+                *u = start + (0.5 * most).copysign(way);
+            } else {
+                *output = Some(*u);
+                // Short of the command by a triangle as high as the way and as long as the ramp.
+                *u -= 0.5 * way * (way.abs() / most);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wire::shaped;
+    use super::*;
+
+    #[test]
+    fn a_step_becomes_a_ramp_and_each_tick_has_its_mean() {
+        let step = 0.1;
+        let commands: Vec<f64> = (0..20).map(|i| if i == 0 { 0.0 } else { 1.0 }).collect();
+        let out = shaped(&RateLimit, 0, &[&[3.0], &[-0.0], &[f64::INFINITY], &[1e9]], step, &commands);
+        // From tick 1 on the output is min(3 (t - 0.1), 1), which reaches 1 a third of the way through tick 4.
+        let ramp = |t: f64| (3.0 * (t - step)).clamp(0.0, 1.0);
+        for (i, got) in out[0].iter().enumerate() {
+            let fine = 10_000;
+            let mean: f64 =
+                (0..fine).map(|k| ramp((i as f64 + (k as f64 + 0.5) / fine as f64) * step)).sum::<f64>() / fine as f64;
+            assert!((got - mean).abs() < 1e-7, "tick {i}: {got}, not {mean}");
+        }
+        assert_eq!(out[1], vec![0.0; 20]);
+        assert_eq!(out[2], commands);
+        assert!(out[3].iter().zip(&commands).all(|(got, command)| (got - command).abs() < 1e-7));
+    }
+
+    #[test]
+    fn a_sine_too_fast_becomes_a_triangle_of_the_rate_and_never_climbs_faster() {
+        let step = 1e-3;
+        let commands: Vec<f64> = (0..20_000).map(|i| (20.0 * i as f64 * step).sin()).collect();
+        let out = &shaped(&RateLimit, 0, &[&[2.0]], step, &commands)[0];
+        assert!(out.windows(2).all(|w| (w[1] - w[0]).abs() <= 2.0 * step * (1.0 + 1e-9)));
+        // Saturated all the time, it climbs for half a period: to rate * period / 4 on either side.
+        let peak = out[10_000..].iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
+        let triangle = 2.0 * (std::f64::consts::TAU / 20.0) / 4.0;
+        assert!((peak - triangle).abs() < 0.02 * triangle, "{peak}, not {triangle}");
+    }
+
+    #[test]
+    fn the_output_moves_smoothly_with_the_rate() {
+        let commands: Vec<f64> = (0..50).map(|i| if i % 25 < 12 { 0.0 } else { 1.0 }).collect();
+        let at = |rate: f64| shaped(&RateLimit, 0, &[&[rate]], 0.02, &commands).remove(0);
+        let (low, high) = (at(7.3 - 1e-6), at(7.3 + 1e-6));
+        let (below, above) = (at(7.3 - 1e-3), at(7.3 + 1e-3));
+        for i in 0..commands.len() {
+            let (fine, wide) = ((high[i] - low[i]) / 2e-6, (above[i] - below[i]) / 2e-3);
+            assert!((fine - wide).abs() < 1e-3, "tick {i}: slopes {fine} and {wide}");
+        }
+    }
+}

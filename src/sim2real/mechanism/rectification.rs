@@ -1,0 +1,67 @@
+//! A sensor that does not tell the sign.
+
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+
+/// `y -> y + fraction (|y| - y)`, on the plant's first channel: `|y|` at a fraction of 1.
+///
+/// Source: the pulse counter of the coupled electric drives, Wigren & Schoukens, "Three free data sets for development and
+/// benchmarking in nonlinear system identification", European Control Conference (2013).
+#[derive(Debug, Clone, Copy)]
+pub struct Rectification;
+
+impl<P: Plant> Mechanism<P> for Rectification
+where
+    P::Observation: AsMut<[f64]>,
+{
+    fn about(&self) -> About {
+        About {
+            name: "rectification",
+            site: Site::Observation,
+            title: "a sensor that does not tell the sign",
+            law: "y -> y + fraction (|y| - y)",
+            source: "Wigren & Schoukens, Three free data sets (coupled electric drives), ECC (2013)",
+            remedy: "use a sensor that tells the direction, or take the magnitude in the simulator too",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, _typical: &Typical) -> Vec<Form> {
+        Form::only(vec![Parameter::new("fraction", "", 0.0).within(0.0, 1.0).starting_at(&[0.5, 1.0])])
+    }
+
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        Box::new(Folded(thetas.row(0).to_vec()))
+    }
+}
+
+struct Folded(Vec<f64>);
+
+impl<P: Plant> Law<P> for Folded
+where
+    P::Observation: AsMut<[f64]>,
+{
+    fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
+        for (observation, fraction) in observations.iter_mut().zip(&self.0) {
+            if let Some(y) = observation.as_mut().first_mut() {
+                *y += fraction * (y.abs() - *y);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wire::{rows, sensed};
+    use super::*;
+
+    #[test]
+    fn the_sign_is_lost_by_the_fraction() {
+        let rows = rows(1_000, 0.01, f64::sin);
+        let out = sensed(&Rectification, 0, &[&[1.0], &[0.25]], 1, &rows);
+        for (i, (_, [y, _])) in rows.iter().enumerate() {
+            assert_eq!(out[0][i][0], y.abs());
+            let folded = if *y < 0.0 { 0.5 * y } else { *y };
+            assert!((out[1][i][0] - folded).abs() < 1e-15);
+        }
+    }
+}

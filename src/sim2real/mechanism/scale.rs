@@ -1,0 +1,64 @@
+//! A sensor that reads too much or too little, in proportion.
+
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+
+/// `y -> (1 + error) y`, on the plant's first channel: a wrong count of pulses per turn, of teeth, or of volts.
+///
+/// Source: scale factor error, IEEE Std 528-2019, *Inertial Sensor Terminology*.
+#[derive(Debug, Clone, Copy)]
+pub struct Scale;
+
+impl<P: Plant> Mechanism<P> for Scale
+where
+    P::Observation: AsMut<[f64]>,
+{
+    fn about(&self) -> About {
+        About {
+            name: "scale",
+            site: Site::Observation,
+            title: "a wrong scale of the sensor",
+            law: "y -> (1 + error) y",
+            source: "scale factor error, IEEE Std 528-2019, Inertial Sensor Terminology",
+            remedy: "move the axis over a known distance; correct the factor from counts to units",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, _typical: &Typical) -> Vec<Form> {
+        // A factor that turns the sign or hides the motion altogether is another fault than this.
+        Form::only(vec![Parameter::new("error", "", 0.0).within(-0.95, 10.0).starting_at(&[0.05, -0.05]).proportional()])
+    }
+
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        Box::new(Factor(thetas.row(0).iter().map(|error| 1.0 + error).collect()))
+    }
+}
+
+struct Factor(Vec<f64>);
+
+impl<P: Plant> Law<P> for Factor
+where
+    P::Observation: AsMut<[f64]>,
+{
+    fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
+        for (observation, factor) in observations.iter_mut().zip(&self.0) {
+            if let Some(y) = observation.as_mut().first_mut() {
+                *y *= factor;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wire::sensed;
+    use super::*;
+
+    #[test]
+    fn readings_are_in_proportion_and_the_other_channel_is_left_alone() {
+        let rows = [(0.0, [-2.0, 1.0]), (1.0, [0.0, 1.0]), (2.0, [4.0, 1.0])];
+        let out = sensed(&Scale, 0, &[&[0.25], &[-0.5]], 1, &rows);
+        assert_eq!(out[0], [[-2.5, 1.0], [0.0, 1.0], [5.0, 1.0]]);
+        assert_eq!(out[1], [[-1.0, 1.0], [0.0, 1.0], [2.0, 1.0]]);
+    }
+}

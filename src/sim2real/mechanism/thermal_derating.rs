@@ -1,0 +1,162 @@
+//! An actuator that weakens as it warms.
+
+use super::decay::Decay;
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+
+/// `dh/dt = strength u^2 - h / time_constant`, `u -> max(0, 1 - h) u`: magnets weaken with the heat that currents leave in the
+/// windings. In the form `reciprocal`, with `reciprocal_strength`, `u -> u / (1 + h)`: copper's resistance grows, and a voltage
+/// drives less current.
+///
+/// `h` is the part of the gain that is lost (to first order, in the second form): a pure number, 0 at the recording's first
+/// row, where the actuator is taken to be at the temperature its gain is known for. `strength` [1/(command^2 s)] is how
+/// much is lost in the first second at a command of 1; a command that holds for long loses `strength time_constant u^2`.
+/// An infinite time constant never cools. The heat is that of the command as it reaches this law.
+///
+/// Heat is solved exactly over a tick for a command that holds; the gain is that of the mean of the heat at its ends.
+///
+/// Source: Joule heat into one lumped capacity, Trujillo & Cutkosky, "Thermally constrained motor operation for a climbing
+/// robot", ICRA 2009; what it does to magnets and copper, Hendershot & Miller, *Design of Brushless Permanent-Magnet
+/// Machines* (2010).
+#[derive(Debug, Clone, Copy)]
+pub struct ThermalDerating;
+
+impl<P: Plant> Mechanism<P> for ThermalDerating
+where
+    P::Command: AsMut<f64>,
+{
+    fn about(&self) -> About {
+        About {
+            name: "thermal_derating",
+            site: Site::Command,
+            title: "an actuator that weakens as it warms",
+            law: "dh/dt = strength u^2 - h / time_constant; linear: u -> max(0, 1 - h) u; reciprocal: u -> u / (1 + h)",
+            source: "Trujillo & Cutkosky, ICRA 2009; Hendershot & Miller, Design of Brushless PM Machines (2010)",
+            remedy: "measure the torque of a warm actuator; cool it, rest it, or let the simulator's gain fall with the heat",
+            contains: &[],
+        }
+    }
+
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
+        let duration = if typical.duration > 0.0 { typical.duration } else { 1.0 };
+        let heat = typical.command * typical.command * duration;
+        let strengths = [0.5, 2.0].map(|lost| if heat > 0.0 { lost / heat } else { lost });
+        let times = [0.15, 0.6].map(|part| part * duration);
+        // The shortest that a winding has; below, the gain would fall within a swing.
+        let time = Parameter::new("time_constant", "s", f64::INFINITY).within(0.1, f64::INFINITY).starting_at(&times);
+        let form = |name, strength| {
+            let strength = Parameter::new(strength, "1/(command^2 s)", 0.0).within(0.0, f64::INFINITY);
+            Form { name, parameters: vec![strength.starting_at(&strengths), time.clone()] }
+        };
+        vec![form("linear", "strength"), form("reciprocal", "reciprocal_strength")]
+    }
+
+    /// An actuator that has warmed stays warm: a run from anywhere needs all commands before.
+    fn memory(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let heat = Heat {
+            strength: thetas.row(0).to_vec(),
+            time_constant: thetas.row(1).to_vec(),
+            lost: vec![0.0; thetas.lanes()],
+            decay: Decay::default(),
+        };
+        if form == 0 { Box::new(Magnets(heat)) } else { Box::new(Copper(heat)) }
+    }
+}
+
+struct Heat {
+    strength: Vec<f64>,
+    time_constant: Vec<f64>,
+    /// `h` at the start of the tick.
+    lost: Vec<f64>,
+    decay: Decay,
+}
+
+impl Heat {
+    /// Takes up what the commands leave in the tick, and gives each the gain that the mean heat over the tick leaves it.
+    fn pass<C: AsMut<f64>>(&mut self, tick: Tick, commands: &mut [C], gain: impl Fn(f64) -> f64) {
+        let gained = self.decay.over(tick.step, &self.time_constant);
+        let parameters = self.strength.iter().zip(&self.time_constant).zip(gained);
+        for ((command, lost), ((strength, tau), gained)) in commands.iter_mut().zip(&mut self.lost).zip(parameters) {
+            let u = command.as_mut();
+            let seconds = if tau.is_finite() { tau * gained } else { tick.step };
+            let start = *lost;
+            *lost += strength * *u * *u * seconds - start * gained;
+            *u *= gain(0.5 * (start + *lost));
+        }
+    }
+}
+
+struct Magnets(Heat);
+
+impl<P: Plant> Law<P> for Magnets
+where
+    P::Command: AsMut<f64>,
+{
+    fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
+        self.0.pass(tick, commands, |heat| (1.0 - heat).max(0.0));
+    }
+}
+
+struct Copper(Heat);
+
+impl<P: Plant> Law<P> for Copper
+where
+    P::Command: AsMut<f64>,
+{
+    fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
+        self.0.pass(tick, commands, |heat| 1.0 / (1.0 + heat));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wire::shaped;
+    use super::*;
+
+    const STRENGTH: f64 = 0.01;
+    const TAU: f64 = 5.0;
+
+    /// Two seconds at full command, three at half of it: within each the heat is an exponential towards its own end.
+    fn heat(t: f64) -> f64 {
+        let towards = |from: f64, end: f64, t: f64| end + (from - end) * (-t / TAU).exp();
+        let (full, half) = (STRENGTH * TAU * 4.0, STRENGTH * TAU);
+        if t < 2.0 { towards(0.0, full, t) } else { towards(towards(0.0, full, 2.0), half, t - 2.0) }
+    }
+
+    #[test]
+    fn the_gain_falls_as_the_exponential_of_the_heat() {
+        let step = 1e-3;
+        let commands: Vec<f64> = (0..5_000).map(|i| if i < 2_000 { 2.0 } else { -1.0 }).collect();
+        let lane: &[f64] = &[STRENGTH, TAU];
+        let linear = &shaped(&ThermalDerating, 0, &[lane], step, &commands)[0];
+        let reciprocal = &shaped(&ThermalDerating, 1, &[lane], step, &commands)[0];
+        for (i, u) in commands.iter().enumerate() {
+            let h = heat((i as f64 + 0.5) * step);
+            assert!((linear[i] - u * (1.0 - h)).abs() < 1e-8, "row {i}");
+            assert!((reciprocal[i] - u / (1.0 + h)).abs() < 1e-8, "row {i}");
+        }
+    }
+
+    #[test]
+    fn long_after_the_loss_is_strength_times_time_constant_times_the_square() {
+        let out = shaped(&ThermalDerating, 0, &[&[0.02, 3.0], &[0.2, 30.0]], 0.01, &vec![2.0; 20_000]);
+        assert!((out[0][19_999] / 2.0 - (1.0 - 0.02 * 3.0 * 4.0)).abs() < 1e-12);
+        // More than there is cannot be lost: an actuator does not pull against its command.
+        assert_eq!(out[1][19_999], 0.0);
+    }
+
+    #[test]
+    fn without_cooling_the_loss_is_all_heat_there_was_and_steps_of_any_length_agree() {
+        let seconds = 7.0;
+        for count in [70, 7_000] {
+            let step = seconds / count as f64;
+            let out = shaped(&ThermalDerating, 0, &[&[STRENGTH, f64::INFINITY], &[STRENGTH, 1e12]], step, &vec![1.0; count]);
+            let middle = seconds - 0.5 * step;
+            assert!((out[0][count - 1] - (1.0 - STRENGTH * middle)).abs() < 1e-12);
+            assert!((out[1][count - 1] - out[0][count - 1]).abs() < 1e-10);
+        }
+    }
+}
