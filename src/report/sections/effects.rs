@@ -1,8 +1,8 @@
-//! What was found, its parameters and its rivals.
+//! What was found, where it acted, and its rivals.
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{percent, uncertain, with_unit};
+use crate::report::quantity::{UNDEFINED, confidence, number, percent, with_unit};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::{Diagnosis, Effect};
 
@@ -30,18 +30,15 @@ impl Section for Effects<'_> {
 }
 
 fn row(effect: &Effect) -> Value {
-    let parameters: Vec<Value> = effect
-        .parameters
-        .iter()
-        .map(|(name, e)| context! { name => name, value => with_unit(&uncertain(e.value, e.std), &e.unit) })
-        .collect();
     let rivals: Vec<String> = effect.rivals.iter().map(|r| format!("{} ({})", r.mechanism, percent(r.confidence))).collect();
+    let moved: Vec<String> =
+        effect.moved.iter().map(|m| format!("{} by {}", m.channel, with_unit(&number(m.rms), &m.unit))).collect();
     context! {
         name => &effect.mechanism,
         site => effect.site.to_string(),
-        confidence => percent(effect.confidence),
-        parameters => parameters,
+        confidence => confidence(effect.confidence),
         rivals => if rivals.is_empty() { "none".to_string() } else { rivals.join(", ") },
-        location => effect.location.as_deref().unwrap_or("–"),
+        location => effect.location.as_deref().unwrap_or(UNDEFINED),
+        moved => if moved.is_empty() { UNDEFINED.to_string() } else { moved.join(", ") },
     }
 }

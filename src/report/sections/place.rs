@@ -4,7 +4,7 @@ use minijinja::{Value, context};
 
 use crate::report::figures::DiagnosisFigures;
 use crate::report::plot::{Curve, Ink, Mark, Plot, Scale};
-use crate::report::quantity::{axis, number, percent, range, significant, with_unit};
+use crate::report::quantity::{axis, decimals, number, percent, range, significant, with_unit};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::{Diagnosis, Effect, Profile};
 
@@ -14,7 +14,7 @@ pub(in crate::report) struct Place<'a> {
 }
 
 /// Stretches of time in the table; plots shade them all.
-const STRETCHES: usize = 6;
+const STRETCHES: usize = 4;
 /// Profiles drawn: three a row.
 const PROFILES: usize = 6;
 
@@ -43,8 +43,7 @@ impl Section for Place<'_> {
                 context! {
                     recording => &i.recording,
                     channel => &i.channel,
-                    start => with_unit(&significant(i.start, 4), "s"),
-                    end => with_unit(&significant(i.end, 4), "s"),
+                    stretch => format!("{} to {} s", decimals(i.start, 2), decimals(i.end, 2)),
                     share => percent(i.share_of_error),
                 }
             })

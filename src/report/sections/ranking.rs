@@ -2,7 +2,7 @@
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{decimals, number, percent};
+use crate::report::quantity::{confidence, decimals, number, percent};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::{Diagnosis, Effect, Score};
 
@@ -44,7 +44,7 @@ impl Section for Ranking<'_> {
 fn place(effect: &Effect) -> Value {
     let rivals: Vec<Value> =
         effect.rivals.iter().map(|r| context! { name => &r.mechanism, confidence => percent(r.confidence) }).collect();
-    context! { name => &effect.mechanism, confidence => percent(effect.confidence), rivals => rivals }
+    context! { name => &effect.mechanism, confidence => confidence(effect.confidence), rivals => rivals }
 }
 
 fn stage(scores: &[Score], number_of: usize) -> Value {

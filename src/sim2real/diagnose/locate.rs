@@ -21,6 +21,8 @@ const MATERIAL: f64 = 3.0;
 const WORSE: f64 = 1.5;
 /// Below this mean squared residual, in units of the noise, nothing is missing anywhere.
 const ABOVE_NOISE: f64 = 1.5;
+/// A stretch that is told holds this part of the squared error.
+const SHARE: f64 = 0.02;
 /// Most stretches that are told of a channel.
 const TOLD: usize = 12;
 
@@ -122,6 +124,7 @@ fn intervals(tracks: &[&Track]) -> Vec<Interval> {
     }
     let mut all: Vec<Interval> = tracks.iter().flat_map(|track| of_one(track, total)).collect();
     all.sort_by(|a, b| b.share_of_error.total_cmp(&a.share_of_error));
+    all.retain(|interval| interval.share_of_error >= SHARE);
     all.truncate(TOLD);
     all
 }
@@ -244,7 +247,9 @@ fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) 
         let (of_error, of_rows) = (squares(&inside) / squares(&all), inside.len() as f64 / all.len().max(1) as f64);
         on == "time" || of_error > WORSE * of_rows
     };
-    let clear = error > DENSER * rows && error > HOLDS && half(false) && half(true);
+    // A stretch in the midst of a recording is told among the intervals; since when, or until when, is said here.
+    let open = on != "time" || low == 0 || high + 1 == bins.len();
+    let clear = error > DENSER * rows && error > HOLDS && half(false) && half(true) && open;
     let value = |i: usize| values[i];
     clear.then(|| {
         let bin = Bin {
