@@ -73,7 +73,7 @@ fn stage(scores: &[Score], number_of: usize) -> Value {
         .collect();
     let before: Vec<String> =
         scores.iter().filter(|s| s.accepted && s.stage < number_of).map(|s| s.mechanism.clone()).collect();
-    context! { number => number_of + 1, before => before, bars => bars, out => out }
+    context! { number => number_of + 1, before => before, bars => bars, screened => out.len(), out => out }
 }
 
 fn label(score: &Score) -> String {
