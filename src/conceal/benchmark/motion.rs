@@ -136,7 +136,7 @@ impl Machine {
                 (now, command) = (at.max(now), *next);
             }
             state = self.integrate(state, command, now, until - now, precision);
-            if !(state.position.abs() < 1e6) {
+            if state.position.is_nan() || state.position.abs() > 1e6 {
                 positions.resize(steps + 1, f64::NAN);
                 break;
             }
