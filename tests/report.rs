@@ -12,8 +12,8 @@ use trueup::report::{
 };
 use trueup::sim2real::Site;
 use trueup::sim2real::diagnose::{
-    ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, NextExperiment, ParameterChange, Rival, SCHEMA, Score,
-    Verdict, Where,
+    Bin, ChannelFit, Checks, Diagnosis, Effect, Estimate, Excitation, Interval, Moved, NextExperiment, ParameterChange,
+    Profile, Rival, SCHEMA, Score, Stretch, Verdict, Where,
 };
 
 /// A page must stay below this [bytes].
@@ -60,7 +60,16 @@ fn servo_trace(recording: &str, held_out: bool, channel: &str, unit: &str, rows:
 }
 
 fn score(mechanism: &str, stage: usize, screen: f64, gain: Option<f64>, accepted: bool) -> Score {
-    Score { mechanism: mechanism.into(), form: String::new(), stage, screen, survival: 0.3 + 0.5 * screen, gain, accepted }
+    Score {
+        mechanism: mechanism.into(),
+        form: String::new(),
+        stage,
+        screen,
+        survival: 0.3 + 0.5 * screen,
+        excited: true,
+        gain,
+        accepted,
+    }
 }
 
 fn estimate(name: &str, value: f64, std: f64, unit: &str) -> (String, Estimate) {
@@ -86,6 +95,31 @@ fn change(name: &str, nominal: f64, value: f64, std: f64, unit: &str) -> (String
     (name.into(), ParameterChange { nominal, value, std, unit: unit.into() })
 }
 
+fn stretch(recording: &str, start: f64, end: f64) -> Stretch {
+    Stretch { recording: recording.into(), start, end }
+}
+
+/// What to record next, in words alone.
+fn advice(what: &str) -> NextExperiment {
+    let rivals = vec!["half_spread".into(), "command_delay".into()];
+    NextExperiment { what: what.into(), file: None, rivals, separation: None, gain: None, gain_so_far: None }
+}
+
+/// The error of a channel over a state.
+fn profile(channel: &str, on: &str, unit: &str) -> Profile {
+    let at: Vec<f64> = (0..40).map(|k| -1.95 + 0.1 * f64::from(k)).collect();
+    Profile {
+        channel: channel.into(),
+        unit: unit.into(),
+        on: on.into(),
+        on_unit: if on == "velocity" { "rad/s".into() } else { String::new() },
+        recalibrated: at.iter().map(|v| 0.02 + 0.09 / (1.0 + 9.0 * v * v)).collect(),
+        trued: at.iter().map(|v| 0.004 + 0.0002 * v).collect(),
+        at,
+        noise: 0.004,
+    }
+}
+
 fn servo_diagnosis(recording: &str) -> Diagnosis {
     let interval = |start, end, share_of_error| Interval {
         channel: "position".into(),
@@ -108,6 +142,8 @@ fn servo_diagnosis(recording: &str) -> Diagnosis {
                 parameters: BTreeMap::from([estimate("torque", 0.180_34, 0.0021, "N m")]),
                 rivals: vec![Rival { mechanism: "backlash".into(), confidence: 0.013 }],
                 location: Some("|velocity| < 0.05 rad/s".into()),
+                active: vec![stretch(recording, 3.0, 4.1), stretch(recording, 9.0, 9.8)],
+                moved: vec![Moved { channel: "position".into(), rms: 0.0812, unit: "rad".into() }],
             },
             Effect {
                 mechanism: "constant_load".into(),
@@ -116,9 +152,23 @@ fn servo_diagnosis(recording: &str) -> Diagnosis {
                 parameters: BTreeMap::from([estimate("torque", -0.0521, 0.0009, "N m")]),
                 rivals: vec![Rival { mechanism: "bias".into(), confidence: 0.04 }],
                 location: None,
+                active: Vec::new(),
+                moved: Vec::new(),
             },
         ],
-        location: Where { intervals: vec![interval(2.0, 4.6, 0.31), interval(17.5, 19.0, 0.22)], onset: None },
+        location: Where {
+            intervals: vec![interval(2.0, 4.6, 0.31), interval(17.5, 19.0, 0.22)],
+            onset: Some(12.4),
+            against: vec![Bin {
+                channel: "position".into(),
+                on: "|velocity|".into(),
+                unit: "rad/s".into(),
+                from: None,
+                to: Some(0.213),
+                share_of_error: 0.71,
+                share_of_rows: 0.17,
+            }],
+        },
         parameters: BTreeMap::from([
             change("inertia", 0.11, 0.104_21, 0.0004, "kg m^2"),
             change("viscous_friction", 0.25, 0.2313, 0.0061, "N m s/rad"),
@@ -132,6 +182,7 @@ fn servo_diagnosis(recording: &str) -> Diagnosis {
             placebo_p: Some(0.01),
             at_bound: Vec::new(),
             tried: 9,
+            not_excited: vec!["quantization".into()],
             notes: vec!["Halving the integration step moves the output by 0.02 noise sigma.".into()],
         },
         next_experiment: None,
@@ -161,6 +212,8 @@ fn servo_figures(recording: &str, rows: usize) -> DiagnosisFigures {
             servo_trace(recording, true, "velocity", "rad/s", rows),
             servo_trace(recording, false, "position", "rad", rows),
         ],
+        profiles: ["command", "position", "velocity"].map(|on| profile("position", on, "rad")).to_vec(),
+        excitation: None,
     }
 }
 
@@ -183,7 +236,8 @@ fn market_page() -> (Diagnosis, DiagnosisFigures) {
             trued: cost,
         }
     };
-    let figures = DiagnosisFigures { traces: vec![trace(true, 700, &mut noise), trace(false, 2_500, &mut noise)] };
+    let traces = vec![trace(true, 700, &mut noise), trace(false, 2_500, &mut noise)];
+    let figures = DiagnosisFigures { traces, ..DiagnosisFigures::default() };
     let mut diagnosis = servo_diagnosis("orders_2024");
     diagnosis.verdict = Verdict::Ambiguous;
     diagnosis.summary =
@@ -200,8 +254,7 @@ fn market_page() -> (Diagnosis, DiagnosisFigures) {
     diagnosis.location.intervals.truncate(1);
     diagnosis.location.intervals[0].channel = "cost".into();
     (diagnosis.location.intervals[0].start, diagnosis.location.intervals[0].end) = (1500.0, 2600.0);
-    diagnosis.next_experiment =
-        Some(NextExperiment { what: "Send 60 orders of one lot within 2 s of a price change.".into() });
+    diagnosis.next_experiment = Some(advice("Send 60 orders of one lot within 2 s of a price change"));
     (diagnosis, figures)
 }
 
@@ -328,7 +381,12 @@ fn a_diagnosis_shows_all_its_evidence() {
     let figures = servo_figures("bench_03.csv", 12_000);
     let page = diagnosis_page(&servo_diagnosis("bench_03.csv"), &figures).unwrap();
     check("diagnosis.html", &page);
-    for id in ["answer", "held-out", "errors", "effects", "ranking", "parameters", "fitted", "checks"] {
+    let sections = ["answer", "where", "fitted", "ranking", "effects", "parameters", "errors", "held-out", "checks"];
+    for pair in sections.windows(2) {
+        let [first, second] = [0, 1].map(|k| page.find(&format!("<section id=\"{}\"", pair[k])).unwrap());
+        assert!(first < second, "{pair:?} stand in another order");
+    }
+    for id in sections {
         assert!(page.contains(&format!("<section id=\"{id}\"")), "no section {id}");
         assert!(page.contains(&format!("href=\"#{id}\"")), "{id} is not in the contents");
     }
@@ -336,13 +394,49 @@ fn a_diagnosis_shows_all_its_evidence() {
     let summary = page.find("The twin leaves out Coulomb friction").unwrap();
     assert!(summary < page.find("<main>").unwrap(), "the summary comes first");
     assert!(page.contains("<span class=\"badge good\">named</span>"));
-    for text in
-        ["0.1803 ± 0.0021 N m", "−0.05210 ± 0.00090 N m", "93 %", "92.6 to 94.1 %", "command_delay", "accepted", "−5 %"]
-    {
+    for text in [
+        "0.1803 ± 0.0021 N m",
+        "−0.05210 ± 0.00090 N m",
+        "0.1762 to 0.1845",
+        "93 %",
+        "92.6 to 94.1 %",
+        "command_delay",
+        "accepted",
+        "−5 %",
+        "It began at <b>12.40 s</b>",
+        "<b>|velocity| &lt; 0.21 rad",
+        "71 % of the squared error in 17 % of the rows",
+        "moved the position by 0.0812 rad",
+        "where what was found acted",
+        "these recordings cannot tell",
+    ] {
         assert!(page.replace('\u{a0}', " ").contains(text), "no `{text}`");
     }
-    assert_eq!(page.matches("<svg").count(), 3 * 2 * 2, "each of three traces, level and residual, wide and narrow");
+    let (traces, profiles) = (3 * 2 * 2, 3);
+    assert_eq!(page.matches("<svg").count(), traces + profiles, "each of three traces, level and residual, wide and narrow");
     assert_eq!(page, diagnosis_page(&servo_diagnosis("bench_03.csv"), &figures).unwrap(), "not the same bytes");
+}
+
+#[test]
+fn the_next_experiment_shows_its_commands() {
+    let mut diagnosis = servo_diagnosis("bench_03.csv");
+    diagnosis.verdict = Verdict::Ambiguous;
+    diagnosis.next_experiment = Some(NextExperiment {
+        file: Some("next_experiment.csv".into()),
+        separation: Some(0.223),
+        gain: Some(126.4),
+        gain_so_far: Some(0.087),
+        ..advice("send next_experiment.csv and record as before")
+    });
+    let time: Vec<f64> = (0..5_000).map(|i| f64::from(i) * 4e-3).collect();
+    let command = time.iter().map(|t| (t * t).sin()).collect();
+    let mut figures = servo_figures("bench_03.csv", 500);
+    figures.excitation = Some(Excitation { name: "a sine".into(), time, command });
+    let page = diagnosis_page(&diagnosis, &figures).unwrap();
+    check("next.html", &page);
+    assert!(page.contains("<section id=\"next\"") && page.contains("Send next_experiment.csv and record as before."));
+    assert!(page.contains("separation 0.223 noise σ") && page.contains("expected gain 126"));
+    assert!(page.contains("of the recordings at hand 0.0870"));
 }
 
 #[test]
@@ -399,7 +493,8 @@ fn text_from_input_stays_text() {
 fn many_long_traces_stay_small_and_the_rest_are_named() {
     let traces: Vec<Trace> =
         (0..24).map(|k| servo_trace(&format!("run_{k:02}"), k % 2 == 0, "position", "rad", 40_000)).collect();
-    let page = diagnosis_page(&servo_diagnosis("run_00"), &DiagnosisFigures { traces }).unwrap();
+    let page =
+        diagnosis_page(&servo_diagnosis("run_00"), &DiagnosisFigures { traces, ..DiagnosisFigures::default() }).unwrap();
     check("many.html", &page);
     assert!(page.contains("Not drawn: run_12: position"), "what is left out is named");
 }

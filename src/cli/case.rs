@@ -8,7 +8,7 @@ use crate::robot::{
     cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
     tanks_assembly, tanks_recordings,
 };
-use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, Excitation, calibrate, diagnose};
+use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, Excitation, Profile, calibrate, diagnose};
 use crate::sim2real::{Assembly, Parameter, Plant, Recording, Seed, Simulator};
 
 use super::fitted::FittedTwin;
@@ -42,6 +42,8 @@ pub(super) struct Diagnosed {
     /// The trued twin.
     pub trued: FittedTwin,
     pub comparisons: Vec<Comparison>,
+    /// Errors over the states they may depend on.
+    pub profiles: Vec<Profile>,
     /// The commands of the next experiment, where one was designed.
     pub excitation: Option<Excitation>,
 }
@@ -129,6 +131,7 @@ impl<P: Plant> Trial for Given<P> {
             trued: FittedTwin::of(&outcome.trued, &outcome.values, &outcome.std),
             diagnosis: outcome.diagnosis,
             comparisons: outcome.comparisons,
+            profiles: outcome.profiles,
             excitation: outcome.excitation,
         }
     }

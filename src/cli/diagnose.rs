@@ -132,7 +132,9 @@ pub(super) fn write(
     overwrite: Overwrite,
 ) -> Result<Vec<PathBuf>, Stop> {
     let diagnosis = &diagnosed.diagnosis;
-    let page = diagnosis_page(diagnosis, &figures(diagnosed.comparisons))?;
+    let experiment = diagnosed.excitation.as_ref().map(|excitation| commands(excitation, file));
+    let figures = figures(diagnosed.comparisons, diagnosed.profiles, diagnosed.excitation);
+    let page = diagnosis_page(diagnosis, &figures)?;
     let name = file.document().path().file_name().unwrap_or_default().to_string_lossy().replace(char::is_control, " ");
     // A sentence with line breaks would leave the comment.
     let summary = diagnosis.summary.replace(char::is_control, " ");
@@ -141,7 +143,6 @@ pub(super) fn write(
         diagnosis.verdict,
         diagnosed.trued.document(file).render(folder)
     );
-    let experiment = diagnosed.excitation.as_ref().map(|excitation| commands(excitation, file));
     let mut output = OutputFolder::create(folder, overwrite)?;
     for (name, text) in FILES.iter().zip([Some(json(diagnosis)?), Some(trued), Some(page), experiment]) {
         if let Some(text) = text {

@@ -2,11 +2,15 @@
 
 use crate::report::{Abscissa, DiagnosisFigures, Trace};
 use crate::sim2real::Clock;
-use crate::sim2real::diagnose::Comparison;
+use crate::sim2real::diagnose::{Comparison, Excitation, Profile};
 
-/// The figures of a report on `comparisons`.
-pub(super) fn figures(comparisons: Vec<Comparison>) -> DiagnosisFigures {
-    DiagnosisFigures { traces: comparisons.into_iter().map(trace).collect() }
+/// The figures of a report: `comparisons` over time, errors over states, and the commands of the next experiment.
+pub(super) fn figures(
+    comparisons: Vec<Comparison>,
+    profiles: Vec<Profile>,
+    excitation: Option<Excitation>,
+) -> DiagnosisFigures {
+    DiagnosisFigures { traces: comparisons.into_iter().map(trace).collect(), profiles, excitation }
 }
 
 fn trace(comparison: Comparison) -> Trace {

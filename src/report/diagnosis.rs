@@ -5,10 +5,10 @@ use crate::sim2real::diagnose::{Diagnosis, Verdict};
 use super::figures::DiagnosisFigures;
 use super::page::{Badge, Page, Tone};
 use super::section::ReportError;
-use super::sections::{Answer, Checks, Effects, Errors, Orders, Parameters, Ranking, Traces};
+use super::sections::{Answer, Checks, Effects, Errors, Next, Orders, Parameters, Place, Ranking, Traces};
 
-/// The report of a diagnosis as one HTML file: what is missing, how sure that is and how much better the trued twin is,
-/// then the evidence.
+/// The report of a diagnosis as one HTML file: what is missing, how sure that is and how much better the trued twin is;
+/// then where, why not something else, the parameters, the proof, and what to record next.
 ///
 /// # Errors
 /// If a template cannot be rendered.
@@ -21,14 +21,16 @@ pub fn diagnosis_page(diagnosis: &Diagnosis, figures: &DiagnosisFigures) -> Resu
         badge: Some(badge(diagnosis.verdict)),
         sections: vec![
             Box::new(Answer { diagnosis }),
-            traces(true),
-            orders(true),
-            Box::new(Errors { diagnosis }),
-            Box::new(Effects { diagnosis }),
-            Box::new(Ranking { diagnosis }),
-            Box::new(Parameters { diagnosis }),
+            Box::new(Place { diagnosis, figures }),
             traces(false),
             orders(false),
+            Box::new(Ranking { diagnosis }),
+            Box::new(Effects { diagnosis }),
+            Box::new(Parameters { diagnosis }),
+            Box::new(Errors { diagnosis }),
+            traces(true),
+            orders(true),
+            Box::new(Next { diagnosis, figures }),
             Box::new(Checks { diagnosis }),
         ],
     };

@@ -1,10 +1,16 @@
 //! What the plots of a diagnosis are drawn from.
 
+use crate::sim2real::diagnose::{Excitation, Profile};
+
 /// The series behind the plots of a diagnosis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DiagnosisFigures {
     /// One entry for each recording, channel and part (fitted or held out), in the order in which to show them.
     pub traces: Vec<Trace>,
+    /// Errors over states, in the order in which to show them.
+    pub profiles: Vec<Profile>,
+    /// The commands of the next experiment, where one was designed.
+    pub excitation: Option<Excitation>,
 }
 
 /// One channel of one recording: what was measured, and what the three twins say. All series have one entry a row.

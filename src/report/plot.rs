@@ -92,6 +92,25 @@ pub(super) struct Shade {
     pub start: f64,
     pub end: f64,
     pub label: String,
+    pub tint: Tint,
+}
+
+/// What a shade points at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Tint {
+    /// Where the twin errs.
+    Misfit,
+    /// Where what was found acted.
+    Active,
+}
+
+impl Tint {
+    fn color(self) -> &'static str {
+        match self {
+            Self::Misfit => "var(--shade)",
+            Self::Active => "var(--active)",
+        }
+    }
 }
 
 /// What the x axis counts.
@@ -144,6 +163,11 @@ impl Plot<'_> {
             self.on_canvas(&format!("{id}-w"), WIDE, self.height.0, self.columns),
             self.on_canvas(&format!("{id}-n"), NARROW, self.height.1, narrow_columns)
         )
+    }
+
+    /// The narrow drawing alone: for plots that stand beside one another.
+    pub(super) fn draw_narrow(&self, id: &str) -> String {
+        format!("<div class=\"drawing\">{}</div>", self.on_canvas(id, NARROW, self.height.1, self.columns))
     }
 
     fn on_canvas(&self, id: &str, width: f64, height: f64, columns: usize) -> String {
@@ -259,8 +283,8 @@ impl Plot<'_> {
             if end <= start {
                 continue;
             }
-            layout =
-                layout.with_shaded_region(ShadedRegion::vertical(start, end).with_color("var(--shade)").with_opacity(1.0));
+            layout = layout
+                .with_shaded_region(ShadedRegion::vertical(start, end).with_color(shade.tint.color()).with_opacity(1.0));
             // A label wider than its stretch would run into its neighbour's.
             if (end - start) / (x.1 - x.0) * width > 34.0 {
                 let top = y.1 - 10.0 / height * (y.1 - y.0);
@@ -347,7 +371,7 @@ mod tests {
             y_label: "cost [$]".into(),
             scale: Scale::Number,
             curves: vec![Curve { ink: Ink::Trued, mark: Mark::Line, x, y }],
-            shades: vec![Shade { start: -5.0, end: 2.0, label: "40 %".into() }],
+            shades: vec![Shade { start: -5.0, end: 2.0, label: "40 %".into(), tint: Tint::Misfit }],
             zero: true,
             diagonal: false,
             within: None,

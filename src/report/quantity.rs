@@ -56,6 +56,11 @@ pub(crate) fn percent(part: f64) -> String {
     }
 }
 
+/// A probability that something is so: nothing is certain.
+pub(crate) fn confidence(part: f64) -> String {
+    if part > 0.99 { "> 99\u{a0}%".into() } else { percent(part) }
+}
+
 /// An interval of parts of one, as percentages to a tenth.
 pub(crate) fn percents(low: f64, high: f64) -> String {
     if !low.is_finite() || !high.is_finite() {

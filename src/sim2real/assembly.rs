@@ -5,8 +5,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    Candidate, Channel, Clock, Controller, Covariate, Dynamics, Feedback, Law, Measured, Mechanism, Observation, Parameter,
-    Plant, Recording, Scene, Seed, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin, Typical,
+    About, Candidate, Channel, Clock, Controller, Covariate, Dynamics, Feedback, Law, Measured, Mechanism, Observation,
+    Parameter, Plant, Recording, Scene, Seed, Signs, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+    Typical,
 };
 
 /// The mechanisms a domain knows: one row each.
@@ -36,6 +37,8 @@ pub struct Assembly<P: Plant> {
     excluded: Vec<String>,
     /// Longest step of integration [s], where it is not the plant's own.
     step: Option<f64>,
+    /// Whether what is random stays out of rollouts.
+    quiet: bool,
 }
 
 impl<P: Plant> fmt::Debug for Assembly<P> {
@@ -56,6 +59,7 @@ impl<P: Plant> Assembly<P> {
             parts: Vec::new(),
             excluded: Vec::new(),
             step: None,
+            quiet: false,
         }
     }
 
@@ -149,6 +153,7 @@ impl<P: Plant> Assembly<P> {
             let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
             let law = part.mechanism.law(part.form, &thetas.block(at, count), seed.child(about.name));
             match part.mechanism.site(part.form) {
+                _ if self.quiet && !part.mechanism.followed(part.form) => {}
                 Site::Command => run.command_laws.push(law),
                 Site::Plant => run.plant_laws.push(law),
                 Site::Observation => run.observation_laws.push(law),
@@ -498,7 +503,8 @@ impl<P: Plant> Twin for Assembly<P> {
             for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {
                 let known = recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus));
                 if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
-                    candidates.push(Candidate { about, form, form_index });
+                    let finishing = mechanism.finishing(form_index);
+                    candidates.push(Candidate { about, form, form_index, finishing });
                 }
             }
         }
@@ -518,6 +524,24 @@ impl<P: Plant> Twin for Assembly<P> {
 
     fn stepping(&self, seconds: f64) -> Self {
         Self { step: Some(seconds), ..self.clone() }
+    }
+
+    fn quiet(&self) -> Self {
+        Self { quiet: true, ..self.clone() }
+    }
+
+    fn recognized(&self, signs: &Signs) -> Vec<Candidate> {
+        let modelled = self.modelled();
+        let unknown = |about: &About| !modelled.contains(&about.name) && !self.excluded.iter().any(|id| id == about.name);
+        let mut found = Vec::new();
+        for mechanism in self.registry.iter().filter(|m| unknown(&m.about())) {
+            for (form_index, mut form) in mechanism.forms(&Default::default()).into_iter().enumerate() {
+                let Some(values) = mechanism.recognized(form_index, signs) else { continue };
+                form.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.nominal = value);
+                found.push(Candidate { about: mechanism.about(), form, form_index, finishing: false });
+            }
+        }
+        found
     }
 
     fn modelled(&self) -> Vec<&'static str> {

@@ -68,6 +68,15 @@ impl fmt::Display for Site {
     }
 }
 
+/// What a measured channel shows of its sensor, whatever simulator it is held against.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Signs {
+    /// The part of the samples that repeat the one before to the last bit, where none should.
+    pub repeated: f64,
+    /// Mean number of repeats in a row.
+    pub run: f64,
+}
+
 /// One way to state a mechanism: a law and the parameters it has.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Form {
@@ -131,6 +140,15 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     /// Whether following a recording can tell of form `form`. Noise cannot be followed, only recognized.
     fn followed(&self, _form: usize) -> bool {
         true
+    }
+    /// Whether form `form` only rounds what is reported: tried as it is once everything else is fitted, for what jumps has
+    /// no gradient to follow.
+    fn finishing(&self, _form: usize) -> bool {
+        false
+    }
+    /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.
+    fn recognized(&self, _form: usize, _signs: &Signs) -> Option<Vec<f64>> {
+        None
     }
     /// For how long what it did before matters to what it does [s]: a run that starts in the middle of a recording sees
     /// the commands of as long a time before.

@@ -22,7 +22,7 @@ mod time;
 pub use assembly::{Assembly, Registry, Run};
 pub use check::{Violation, check_mechanism, check_plant};
 pub use controller::{Controller, DerivativeOf, Feedback, Pid};
-pub use mechanism::{About, Form, Law, Mechanism, Scene, Site};
+pub use mechanism::{About, Form, Law, Mechanism, Scene, Signs, Site};
 pub use parameter::{Parameter, Thetas};
 pub use plant::{Channel, Clock, Command, Covariate, DelayLine, Dynamics, Observation, Plant, Stimulus, Typical};
 pub use recording::{Measured, Part, Recording, Simulated, Trajectory};

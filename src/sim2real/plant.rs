@@ -111,7 +111,7 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     /// Its running part.
     type Dynamics: Dynamics<Self>;
     /// What drives it while a recording is followed.
-    type Stimulus: Stimulus<Self> + Send + Sync;
+    type Stimulus: Stimulus<Self> + Clone + Send + Sync;
 
     /// Name, as a twin's `model`.
     fn name(&self) -> &'static str;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, Thetas, Trajectory};
+use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, Signs, Thetas, Trajectory};
 
 /// Something that follows a recording and says what it would have measured.
 ///
@@ -14,7 +14,7 @@ use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, 
 /// sample for each row followed; a lane's bits depend on neither the lanes beside it nor the thread.
 pub trait Simulator: Send + Sync {
     /// What drives it.
-    type Stimulus: Send + Sync;
+    type Stimulus: Clone + Send + Sync;
     /// Name.
     fn name(&self) -> String;
     /// The channels it simulates.
@@ -80,6 +80,8 @@ pub struct Candidate {
     pub form: Form,
     /// Number of that form.
     pub form_index: usize,
+    /// Whether it only rounds what is reported, and is tried as it is when everything else is fitted.
+    pub finishing: bool,
 }
 
 /// A simulator that can be given mechanisms it lacks.
@@ -93,6 +95,15 @@ pub trait Twin: Simulator + Clone {
     #[must_use]
     fn stepping(&self, _seconds: f64) -> Self {
         self.clone()
+    }
+    /// The twin as it is followed: without what is random, which no recording can be followed in.
+    #[must_use]
+    fn quiet(&self) -> Self {
+        self.clone()
+    }
+    /// The mechanisms that `signs` show by themselves, their parameters' nominal values as shown.
+    fn recognized(&self, _signs: &Signs) -> Vec<Candidate> {
+        Vec::new()
     }
     /// Ids of the mechanisms it models.
     fn modelled(&self) -> Vec<&'static str>;

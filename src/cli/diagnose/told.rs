@@ -6,7 +6,7 @@ use comfy_table::Table;
 
 use crate::cli::screen::{Screen, titled};
 use crate::report::quantity::{
-    UNDEFINED, axis, decimals, number, percent, percents, range, significant, uncertain, with_unit,
+    UNDEFINED, axis, confidence, decimals, number, percent, percents, range, significant, uncertain, with_unit,
 };
 use crate::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, Score};
 
@@ -58,7 +58,7 @@ fn effects(screen: &Screen, effects: &[Effect]) -> Table {
         table.add_row([
             effect.mechanism.clone(),
             effect.site.to_string(),
-            percent(effect.confidence),
+            confidence(effect.confidence),
             parameters.join("\n"),
             effect.location.clone().unwrap_or_else(|| UNDEFINED.to_owned()),
             if rivals.is_empty() { "none".to_owned() } else { rivals.join("\n") },
@@ -79,7 +79,7 @@ fn place(diagnosis: &Diagnosis) -> String {
         text += &format!("  {}: {}: {share}\n", bin.channel, range(bin));
     }
     for stretch in location.intervals.iter().take(STRETCHES) {
-        let (start, end) = (significant(stretch.start, 4), significant(stretch.end, 4));
+        let (start, end) = (decimals(stretch.start, 2), decimals(stretch.end, 2));
         let share = percent(stretch.share_of_error);
         text += &format!("  {}: {start} to {end} s of {}: {share} of the error\n", stretch.channel, stretch.recording);
     }

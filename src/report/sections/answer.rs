@@ -2,7 +2,7 @@
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{number, percent, percents, uncertain, with_unit};
+use crate::report::quantity::{confidence, number, percent, percents, uncertain, with_unit};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, Verdict};
 
@@ -70,7 +70,7 @@ fn effect(effect: &Effect) -> Value {
         name => &effect.mechanism,
         site => effect.site.to_string(),
         location => effect.location.as_deref(),
-        confidence => percent(effect.confidence),
+        confidence => confidence(effect.confidence),
         width => width(effect.confidence, 1.0),
         parameters => parameters,
         rivals => rivals,

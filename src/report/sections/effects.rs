@@ -1,8 +1,8 @@
-//! What was found, its parameters and its rivals; and where model and recording part.
+//! What was found, where it acted, and its rivals.
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{percent, significant, uncertain, with_unit};
+use crate::report::quantity::{UNDEFINED, confidence, number, percent, with_unit};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::{Diagnosis, Effect};
 
@@ -20,50 +20,25 @@ impl Section for Effects<'_> {
     }
 
     fn render(&self) -> Result<String, ReportError> {
-        let location = &self.diagnosis.location;
         let rows: Vec<Value> = self.diagnosis.effects.iter().map(row).collect();
-        let intervals: Vec<Value> = location
-            .intervals
-            .iter()
-            .map(|i| {
-                context! {
-                    recording => &i.recording,
-                    channel => &i.channel,
-                    start => with_unit(&significant(i.start, 4), "s"),
-                    end => with_unit(&significant(i.end, 4), "s"),
-                    share => percent(i.share_of_error),
-                }
-            })
-            .collect();
-        if rows.is_empty() && intervals.is_empty() && location.onset.is_none() {
+        if rows.is_empty() {
             return Ok(String::new());
         }
-        fill(
-            "effects.html",
-            include_str!("../templates/effects.html"),
-            context! {
-                rows => rows,
-                intervals => intervals,
-                onset => location.onset.map(|t| with_unit(&significant(t, 4), "s")),
-                modelled => self.diagnosis.modelled.clone(),
-            },
-        )
+        let modelled = self.diagnosis.modelled.clone();
+        fill("effects.html", include_str!("../templates/effects.html"), context! { rows => rows, modelled => modelled })
     }
 }
 
 fn row(effect: &Effect) -> Value {
-    let parameters: Vec<Value> = effect
-        .parameters
-        .iter()
-        .map(|(name, e)| context! { name => name, value => with_unit(&uncertain(e.value, e.std), &e.unit) })
-        .collect();
     let rivals: Vec<String> = effect.rivals.iter().map(|r| format!("{} ({})", r.mechanism, percent(r.confidence))).collect();
+    let moved: Vec<String> =
+        effect.moved.iter().map(|m| format!("{} by {}", m.channel, with_unit(&number(m.rms), &m.unit))).collect();
     context! {
         name => &effect.mechanism,
         site => effect.site.to_string(),
-        confidence => percent(effect.confidence),
-        parameters => parameters,
+        confidence => confidence(effect.confidence),
         rivals => if rivals.is_empty() { "none".to_string() } else { rivals.join(", ") },
-        location => effect.location.as_deref().unwrap_or("–"),
+        location => effect.location.as_deref().unwrap_or(UNDEFINED),
+        moved => if moved.is_empty() { UNDEFINED.to_string() } else { moved.join(", ") },
     }
 }

@@ -4,7 +4,7 @@ use minijinja::{Value, context};
 
 use crate::report::backtest::BacktestPage;
 use crate::report::data_time::{Cut, DataTime};
-use crate::report::plot::{Curve, Ink, Mark, Plot, Scale, Shade};
+use crate::report::plot::{Curve, Ink, Mark, Plot, Scale, Shade, Tint};
 use crate::report::quantity::axis;
 use crate::report::section::{ReportError, Section, fill};
 
@@ -69,7 +69,9 @@ impl Section for Equity<'_> {
 
 /// Where time was cut, as stretches to point at.
 pub(super) fn gaps(cuts: &[Cut]) -> Vec<Shade> {
-    cuts.iter().map(|cut| Shade { start: cut.around.0, end: cut.around.1, label: "gap".into() }).collect()
+    cuts.iter()
+        .map(|cut| Shade { start: cut.around.0, end: cut.around.1, label: "gap".into(), tint: Tint::Misfit })
+        .collect()
 }
 
 /// By how much equity lies below its highest value so far [%]; none where that is not positive.

@@ -2,7 +2,7 @@
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{axis, number, percents};
+use crate::report::quantity::{axis, number, percent, percents};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::Diagnosis;
 
@@ -16,7 +16,7 @@ impl Section for Errors<'_> {
     }
 
     fn title(&self) -> &'static str {
-        "Errors"
+        "Proof"
     }
 
     fn render(&self) -> Result<String, ReportError> {
@@ -39,6 +39,12 @@ impl Section for Errors<'_> {
                 }
             })
             .collect();
-        fill("errors.html", include_str!("../templates/errors.html"), context! { rows => rows })
+        let placebo = self.diagnosis.checks.placebo_p.map(percent);
+        let held_out = &self.diagnosis.held_out;
+        fill(
+            "errors.html",
+            include_str!("../templates/errors.html"),
+            context! { rows => rows, placebo => placebo, held_out => held_out },
+        )
     }
 }

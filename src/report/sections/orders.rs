@@ -3,7 +3,7 @@
 use minijinja::{Value, context};
 
 use crate::report::figures::{Abscissa, DiagnosisFigures, Trace};
-use crate::report::plot::{Curve, Mark, Plot, Scale, Shade};
+use crate::report::plot::{Curve, Mark, Plot, Scale, Shade, Tint};
 use crate::report::quantity::{axis, percent};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::Diagnosis;
@@ -97,7 +97,12 @@ impl Orders<'_> {
             |i: &&crate::sim2real::diagnose::Interval| i.channel == trace.channel && i.recording == trace.recording;
         let intervals = self.diagnosis.location.intervals.iter().filter(of_this);
         intervals
-            .map(|i| Shade { start: number(i.start) + 0.5, end: number(i.end) + 0.5, label: percent(i.share_of_error) })
+            .map(|i| Shade {
+                start: number(i.start) + 0.5,
+                end: number(i.end) + 0.5,
+                label: percent(i.share_of_error),
+                tint: Tint::Misfit,
+            })
             .filter(|s| s.end > s.start)
             .collect()
     }

@@ -2,9 +2,9 @@
 
 use minijinja::{Value, context};
 
-use crate::report::quantity::{decimals, number, percent};
+use crate::report::quantity::{confidence, decimals, number, percent};
 use crate::report::section::{ReportError, Section, fill};
-use crate::sim2real::diagnose::{Diagnosis, Score};
+use crate::sim2real::diagnose::{Diagnosis, Effect, Score};
 
 use super::answer::width;
 
@@ -18,7 +18,7 @@ impl Section for Ranking<'_> {
     }
 
     fn title(&self) -> &'static str {
-        "What was tried"
+        "Why not the rivals"
     }
 
     fn render(&self) -> Result<String, ReportError> {
@@ -30,8 +30,21 @@ impl Section for Ranking<'_> {
         if stages.is_empty() {
             return Ok(String::new());
         }
-        fill("ranking.html", include_str!("../templates/ranking.html"), context! { stages => stages })
+        let places: Vec<Value> = self.diagnosis.effects.iter().map(place).collect();
+        let not_excited = self.diagnosis.checks.not_excited.clone();
+        fill(
+            "ranking.html",
+            include_str!("../templates/ranking.html"),
+            context! { stages => stages, places => places, not_excited => not_excited },
+        )
     }
+}
+
+/// What stands in the place of an effect.
+fn place(effect: &Effect) -> Value {
+    let rivals: Vec<Value> =
+        effect.rivals.iter().map(|r| context! { name => &r.mechanism, confidence => percent(r.confidence) }).collect();
+    context! { name => &effect.mechanism, confidence => confidence(effect.confidence), rivals => rivals }
 }
 
 fn stage(scores: &[Score], number_of: usize) -> Value {
@@ -60,7 +73,7 @@ fn stage(scores: &[Score], number_of: usize) -> Value {
         .collect();
     let before: Vec<String> =
         scores.iter().filter(|s| s.accepted && s.stage < number_of).map(|s| s.mechanism.clone()).collect();
-    context! { number => number_of + 1, before => before, bars => bars, out => out }
+    context! { number => number_of + 1, before => before, bars => bars, screened => out.len(), out => out }
 }
 
 fn label(score: &Score) -> String {

@@ -3,7 +3,7 @@
 use minijinja::{Value, context};
 
 use crate::report::figures::{Abscissa, DiagnosisFigures, Trace};
-use crate::report::plot::{Curve, Ink, Mark, Plot, Scale, Shade};
+use crate::report::plot::{Curve, Ink, Mark, Plot, Scale, Shade, Tint};
 use crate::report::quantity::{axis, number, percent, with_unit};
 use crate::report::section::{ReportError, Section, fill};
 use crate::sim2real::diagnose::Diagnosis;
@@ -66,6 +66,7 @@ impl Traces<'_> {
         });
         let caption = trace.caption();
         let shades = self.shades(trace);
+        let active = self.active(trace);
         let level = Plot {
             alt: format!("{caption}: measured, nominal, recalibrated and trued over time"),
             x_label: String::new(),
@@ -84,7 +85,11 @@ impl Traces<'_> {
             x_label: "time [s]".into(),
             y_label: axis("residual", &trace.unit),
             curves: residuals,
-            shades: shades.iter().map(|s| Shade { label: String::new(), ..s.clone() }).collect(),
+            shades: if active.is_empty() {
+                shades.iter().map(|s| Shade { label: String::new(), ..s.clone() }).collect()
+            } else {
+                active.clone()
+            },
             zero: true,
             within: limits.map(|(_, _, most)| (-most, most)),
             height: (210.0, 190.0),
@@ -96,6 +101,7 @@ impl Traces<'_> {
             level => Value::from_safe_string(level.draw(&format!("{id}-{k}"))),
             residual => Value::from_safe_string(residual.draw(&format!("{id}-{k}-r"))),
             shaded => !shades.is_empty(),
+            active => !active.is_empty(),
         }
     }
 
@@ -105,7 +111,19 @@ impl Traces<'_> {
             i.channel == trace.channel && i.recording == trace.recording && i.end > *first && i.start < *last
         };
         let intervals = self.diagnosis.location.intervals.iter().filter(of_this);
-        intervals.map(|i| Shade { start: i.start, end: i.end, label: percent(i.share_of_error) }).collect()
+        intervals
+            .map(|i| Shade { start: i.start, end: i.end, label: percent(i.share_of_error), tint: Tint::Misfit })
+            .collect()
+    }
+
+    /// When what was found acted, where it acts at times only.
+    fn active(&self, trace: &Trace) -> Vec<Shade> {
+        let (Some(first), Some(last)) = (trace.time.first(), trace.time.last()) else { return Vec::new() };
+        let stretches = self.diagnosis.effects.iter().flat_map(|effect| &effect.active);
+        stretches
+            .filter(|s| s.recording == trace.recording && s.end > *first && s.start < *last)
+            .map(|s| Shade { start: s.start, end: s.end, label: String::new(), tint: Tint::Active })
+            .collect()
     }
 }
 

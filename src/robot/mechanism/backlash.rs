@@ -58,6 +58,11 @@ where
         if form == 0 { Site::Command } else { Site::Plant }
     }
 
+    /// Play remembers the last turn of the command that was wide enough to cross it.
+    fn memory(&self) -> f64 {
+        5.0
+    }
+
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let row = thetas.row(0).to_vec();
         if form == 0 {

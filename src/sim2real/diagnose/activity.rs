@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::locate::{Covariates, identity};
+use super::locate::{Covariates, identity, unit};
 use super::{Diagnosis, Moved, Stretch, Verdict};
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Part, Thetas, Trajectory, Twin};
@@ -171,11 +171,6 @@ fn deeds_of<T: Twin>(
         })
         .filter(|deed| deed.size.is_finite())
         .collect()
-}
-
-fn unit<T: Twin>(inquiry: &Inquiry<'_, T>, name: &str) -> String {
-    let known = inquiry.twin.channels().iter().find(|c| c.name == name);
-    known.map(|c| inquiry.twin.unit(&c.unit)).unwrap_or_default()
 }
 
 /// When that was, in words and as stretches.

@@ -80,6 +80,19 @@ impl<T: Twin> Inquiry<'_, T> {
         self.fitted(twin, added, &[joint, given], Some(&whole.fit.state), Effort::Thorough)
     }
 
+    /// `parent` with candidate `number` added at its nominal values, and nothing fitted anew.
+    pub fn as_it_is(&self, parent: &Hypothesis<T>, number: usize) -> Hypothesis<T> {
+        let twin = parent.twin.with(&self.candidates[number]);
+        let problem = self.problem(&twin, &self.evidence.compared);
+        let mut fit = parent.fit.clone();
+        fit.values.extend(self.candidates[number].form.parameters.iter().map(|p| p.nominal));
+        fit.std.resize(fit.values.len(), 0.0);
+        fit.residual = problem.evaluate(&fit.values, &fit.state, &[]).residual;
+        let blocks = problem.blocks();
+        let added = parent.added.iter().copied().chain([number]).collect();
+        self.weighed(twin, added, fit, &blocks)
+    }
+
     /// `hypothesis` refitted with this inquiry's step of integration, from where it stands.
     pub fn refitted(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
         let twin = hypothesis.added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]));

@@ -21,6 +21,8 @@ const MATERIAL: f64 = 3.0;
 const WORSE: f64 = 1.5;
 /// Below this mean squared residual, in units of the noise, nothing is missing anywhere.
 const ABOVE_NOISE: f64 = 1.5;
+/// A stretch that is told holds this part of the squared error.
+const SHARE: f64 = 0.02;
 /// Most stretches that are told of a channel.
 const TOLD: usize = 12;
 
@@ -75,18 +77,21 @@ pub(super) fn located<T: Twin>(
     for channel in channels {
         let own: Vec<&Track> = tracks.iter().filter(|t| t.channel == channel).collect();
         found.intervals.extend(intervals(&own));
-        let unit = |name: &str| {
-            let known = inquiry.twin.channels().iter().find(|c| c.name == name);
-            known.map(|c| inquiry.twin.unit(&c.unit)).unwrap_or_default()
-        };
-        found.against.extend(against(&own, inquiry.twin.clock(), &unit));
+        found.against.extend(against(&own, inquiry.twin.clock(), &|name| unit(inquiry, name)));
     }
     found.intervals.sort_by(|a, b| b.share_of_error.total_cmp(&a.share_of_error));
     found.onset = onset::onset(inquiry, recalibrated).map(|onset| onset.time);
     found
 }
 
-fn tracks<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, covariates: &Covariates) -> Vec<Track> {
+/// The unit of a covariate, where it is a channel's.
+pub(super) fn unit<T: Twin>(inquiry: &Inquiry<'_, T>, name: &str) -> String {
+    let known = inquiry.twin.channels().iter().find(|c| c.name == name);
+    known.map(|c| inquiry.twin.unit(&c.unit)).unwrap_or_default()
+}
+
+/// The residuals of `hypothesis`, channel by channel and recording by recording.
+pub(super) fn tracks<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, covariates: &Covariates) -> Vec<Track> {
     let parts = &inquiry.evidence.compared;
     let mut tracks: BTreeMap<(usize, String), Track> = BTreeMap::new();
     for block in inquiry.problem(&hypothesis.twin, parts).blocks() {
@@ -119,6 +124,7 @@ fn intervals(tracks: &[&Track]) -> Vec<Interval> {
     }
     let mut all: Vec<Interval> = tracks.iter().flat_map(|track| of_one(track, total)).collect();
     all.sort_by(|a, b| b.share_of_error.total_cmp(&a.share_of_error));
+    all.retain(|interval| interval.share_of_error >= SHARE);
     all.truncate(TOLD);
     all
 }
@@ -217,8 +223,7 @@ fn against(tracks: &[&Track], clock: Clock, unit: &dyn Fn(&str) -> String) -> Ve
 /// The range of a covariate in which the squared error is densest, and how far the error's distribution over the covariate
 /// is from that of the rows (Kullback & Leibler 1951); none where it is about the same.
 fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) -> Option<(f64, Bin)> {
-    let mut order: Vec<usize> = (0..values.len()).filter(|i| values[*i].is_finite()).collect();
-    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let order = sorted(values);
     let bins = quantile_bins(&order, values);
     if bins.len() < 3 {
         return None;
@@ -242,7 +247,9 @@ fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) 
         let (of_error, of_rows) = (squares(&inside) / squares(&all), inside.len() as f64 / all.len().max(1) as f64);
         on == "time" || of_error > WORSE * of_rows
     };
-    let clear = error > DENSER * rows && error > HOLDS && half(false) && half(true);
+    // A stretch in the midst of a recording is told among the intervals; since when, or until when, is said here.
+    let open = on != "time" || low == 0 || high + 1 == bins.len();
+    let clear = error > DENSER * rows && error > HOLDS && half(false) && half(true) && open;
     let value = |i: usize| values[i];
     clear.then(|| {
         let bin = Bin {
@@ -256,6 +263,25 @@ fn range(channel: &str, on: &str, unit: &str, values: &[f64], residual: &[f64]) 
         };
         (distance, bin)
     })
+}
+
+/// How unevenly the squared error lies over the values of a covariate (Kullback & Leibler, as [`range`] has it).
+pub(super) fn unevenness(values: &[f64], residual: &[f64]) -> f64 {
+    let order = sorted(values);
+    let squares = |rows: &[usize]| rows.iter().map(|i| residual[*i] * residual[*i]).sum::<f64>();
+    let total = squares(&order);
+    let of = |bin: &&[usize]| {
+        let (error, rows) = (squares(bin) / total, bin.len() as f64 / order.len() as f64);
+        if error > 0.0 { error * (error / rows).ln() } else { 0.0 }
+    };
+    quantile_bins(&order, values).iter().map(of).sum()
+}
+
+/// Numbers of the rows that have a value, by value.
+fn sorted(values: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..values.len()).filter(|i| values[*i].is_finite()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    order
 }
 
 /// Quantile bins of rows sorted by their values; equal values stay together.

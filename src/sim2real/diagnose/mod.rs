@@ -17,7 +17,9 @@ mod hypothesis;
 mod locate;
 mod noise;
 mod onset;
+mod profile;
 mod prove;
+mod recognize;
 mod rivals;
 mod screen;
 mod select;
@@ -35,6 +37,7 @@ pub use excitation::Excitation;
 pub use experiment::EXPERIMENT_FILE;
 pub use hypothesis::Hypothesis;
 pub use noise::channel_weights;
+pub use profile::Profile;
 
 use hypothesis::Inquiry;
 use prove::Contest;
@@ -85,6 +88,8 @@ pub struct Outcome<T> {
     pub std: Vec<f64>,
     /// Measurements beside the three twins.
     pub comparisons: Vec<Comparison>,
+    /// Errors over the states they may depend on.
+    pub profiles: Vec<Profile>,
     /// The commands of the next experiment, where one was designed.
     pub excitation: Option<Excitation>,
 }
@@ -116,9 +121,35 @@ pub fn diagnose<T: Twin>(
     seed: Seed,
     progress: Progress<'_>,
 ) -> Outcome<T> {
+    let signs = recognize::signs(twin, recordings);
+    let found = Found { signs, of: twin.recognized(&signs) };
+    let quiet = twin.quiet();
+    if found.of.is_empty() {
+        return followed(&quiet, recordings, held_out, &found, seed, progress);
+    }
+    let channel = twin.channels().first().map(|c| c.name.clone()).unwrap_or_default();
+    let cleaned = [recordings, held_out].map(|all| recognize::without_repeats(all, &channel));
+    followed(&quiet, &cleaned[0], &cleaned[1], &found, seed, progress)
+}
+
+/// What the recordings show by themselves.
+pub(super) struct Found {
+    signs: super::Signs,
+    of: Vec<super::Candidate>,
+}
+
+/// The same of a twin that is followed, beside what was found without following it.
+fn followed<T: Twin>(
+    twin: &T,
+    recordings: &[Recording<T::Stimulus>],
+    held_out: &[Recording<T::Stimulus>],
+    found: &Found,
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Outcome<T> {
     progress("dividing the recordings", 0, 1);
     let evidence = Evidence::divide(twin, recordings, held_out);
-    let candidates = twin.candidates(recordings);
+    let candidates = recognize::fixed(twin.candidates(recordings));
     // Where a plant adds up errors, a free run tells most if the physics is complete, and hardly anything if it is not.
     let free_run = evidence.in_free_run();
     let mut inquiry = Inquiry { twin, candidates: &candidates, evidence: &free_run, seed };
@@ -128,6 +159,7 @@ pub fn diagnose<T: Twin>(
         (selection, rivals) = selected(&inquiry, progress);
     }
     selection.mark_accepted(&candidates);
+    let selection = recognize::finished(&inquiry, selection, &mut rivals);
     progress("proving on held-out data", 0, 1);
     let recalibrated = inquiry.in_free_run(&selection.recalibrated);
     let trued = inquiry.in_free_run(&selection.selected);
@@ -148,18 +180,26 @@ pub fn diagnose<T: Twin>(
         trued: trued.clone(),
     };
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
+    verdict::recognized(&mut diagnosis, &inquiry, found);
     progress("saying where", 0, 1);
     let covariates = locate::covariates(&inquiry);
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
     let activities = activity::activities(&inquiry, &selection.selected, &trued, &covariates);
     activity::tell(&mut diagnosis, &inquiry, &selection.selected, activities);
+    let profiles = profile::profiles(&inquiry, &selection.recalibrated, &selection.selected, &covariates);
     progress("designing the next experiment", 0, 1);
     let next = experiment::next(&inquiry, &selection, &rivals, diagnosis.verdict, &diagnosis.effects);
     let excitation = next.and_then(|(next, excitation)| {
         diagnosis.next_experiment = Some(next);
         excitation
     });
-    Outcome { diagnosis, trued: selection.selected.twin, values: trued.values, std: findings.std, comparisons, excitation }
+    let (mut trued_twin, mut values, mut std) = (selection.selected.twin, trued.values, findings.std);
+    for candidate in &found.of {
+        trued_twin = trued_twin.with(candidate);
+        values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
+        std.resize(values.len(), 0.0);
+    }
+    Outcome { diagnosis, trued: trued_twin, values, std, comparisons, profiles, excitation }
 }
 
 /// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.

@@ -47,6 +47,7 @@ pub(super) fn signatures<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<
     let has: Vec<&str> = parent.added.iter().map(|n| inquiry.candidates[*n].about.name).collect();
     (0..inquiry.candidates.len())
         .into_par_iter()
+        .filter(|number| !inquiry.candidates[*number].finishing)
         .filter(|number| !has.contains(&inquiry.candidates[*number].about.name))
         .filter_map(|number| screen(inquiry, parent, number, &grounds))
         .collect()

@@ -95,6 +95,20 @@ impl<T: Twin> Selection<T> {
         self.selected.misfits.iter().all(|m| m.sum_of_squares <= ABOVE_NOISE * m.count as f64)
     }
 
+    /// Notes what was added as it is, after everything else.
+    pub fn note_finished(&mut self, candidate: &Candidate, gain: f64) {
+        self.scores.push(Score {
+            mechanism: candidate.about.name.to_owned(),
+            form: candidate.form.name.to_owned(),
+            stage: self.selected.added.len() - 1,
+            screen: 0.0,
+            survival: 1.0,
+            gain: Some(gain),
+            accepted: true,
+            excited: true,
+        });
+    }
+
     /// Marks the scores of what was selected, each in the last stage in which it was tried.
     pub fn mark_accepted(&mut self, candidates: &[Candidate]) {
         for number in &self.selected.added {

@@ -9,7 +9,7 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::{Place, confidences};
 use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
-use super::{whiteness, words};
+use super::{Found, whiteness, words};
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Covariate, Part, Recording, Twin};
 
@@ -26,8 +26,14 @@ const FORETOLD_WELL: f64 = 0.25;
 const FAR_ABOVE_THE_NOISE: f64 = 9.0;
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
 const AT_THE_NOISE: f64 = 1.5;
+/// What a regression foretells counts where the mean squared residual is more than this many times the noise.
+const HARDLY_ABOVE: f64 = 1.2;
 /// With fewer rows than this, what is not explained is not called explained either.
 const FEWEST_ROWS: usize = 50;
+/// Confidence in what needs no fit to be seen.
+const CERTAIN_BY_SIGHT: f64 = 0.99;
+/// A mechanism that changes the residuals by less than this, in noise and over all rows, does nothing.
+const DISTINCT: f64 = 5.0;
 /// A name less certain than this is ambiguous.
 const CERTAIN: f64 = 0.7;
 
@@ -129,7 +135,7 @@ pub(super) fn diagnosis<T: Twin>(
     let selected = &selection.selected;
     let mut effects = effects(inquiry, selected, places, findings);
     let verdict = match decide(selection, &effects, findings) {
-        Verdict::Named | Verdict::Ambiguous if !distinct(inquiry, selected, findings) => Verdict::Unexplained,
+        Verdict::Named | Verdict::Ambiguous if !distinct(inquiry, selected) => Verdict::Unexplained,
         verdict => verdict,
     };
     if verdict == Verdict::Unexplained {
@@ -162,19 +168,61 @@ pub(super) fn diagnosis<T: Twin>(
     }
 }
 
-/// Whether every mechanism found is told from one that does nothing: by twice its standard deviation, in one of its
-/// parameters at least. A fit may be helped out of a wrong place by a mechanism that then does nothing.
-fn distinct<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> bool {
+/// Adds what the recordings show by themselves.
+pub(super) fn recognized<T: Twin>(diagnosis: &mut Diagnosis, inquiry: &Inquiry<'_, T>, found: &Found) {
+    let titles: Vec<&str> = found.of.iter().map(|c| c.about.title).collect();
+    if titles.is_empty() {
+        return;
+    }
+    let told = format!(
+        "{}: {:.1} % of the samples repeat the one before to the last bit, and were taken for lost",
+        titles.join(", "),
+        100.0 * found.signs.repeated
+    );
+    if diagnosis.verdict == Verdict::NoMismatch {
+        diagnosis.verdict = Verdict::Named;
+        diagnosis.summary = format!("The recordings show {told}; for the rest the {} explains them.", inquiry.twin.name());
+    }
+    diagnosis.checks.notes.push(told);
+    diagnosis.effects.extend(found.of.iter().map(|candidate| {
+        Effect {
+            mechanism: candidate.about.name.to_owned(),
+            site: candidate.about.site,
+            confidence: CERTAIN_BY_SIGHT,
+            parameters: candidate
+                .form
+                .parameters
+                .iter()
+                .map(|p| {
+                    let estimate = Estimate { value: p.nominal, std: 0.0, unit: inquiry.twin.unit(&p.unit) };
+                    (p.name.clone().into_owned(), estimate)
+                })
+                .collect(),
+            rivals: Vec::new(),
+            location: None,
+            active: Vec::new(),
+            moved: Vec::new(),
+        }
+    }));
+}
+
+/// Whether every mechanism found does something: with its parameters put back to where they do nothing, and all others left
+/// as they are, residuals must change. A fit may be helped out of a wrong place by a mechanism that then does nothing.
+fn distinct<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> bool {
+    let problem = inquiry.problem(&selected.twin, &inquiry.evidence.compared);
+    let fit = &selected.fit;
+    let residual = |values: &[f64]| problem.evaluate(values, &fit.state, &[]).residual;
+    let with = residual(&fit.values);
     let mut at = inquiry.twin.parameters().len();
     selected.added.iter().all(|number| {
-        let parameters = &inquiry.candidates[*number].form.parameters;
-        let from = at;
-        at += parameters.len();
-        parameters.iter().enumerate().any(|(k, p)| {
-            let away = (findings.trued.values[from + k] - p.nominal).abs();
-            // Of a parameter that the output jumps on, the width of the plateau is no standard deviation.
-            !p.smooth || away > 2.0 * findings.std[from + k]
-        })
+        let candidate = &inquiry.candidates[*number];
+        let (from, count) = (at, candidate.form.parameters.len());
+        at += count;
+        let mut values = fit.values.clone();
+        for (value, p) in values[from..from + count].iter_mut().zip(&candidate.form.parameters) {
+            *value = p.nominal;
+        }
+        candidate.finishing || (&with - residual(&values)).norm() >= DISTINCT
     })
 }
 
@@ -221,7 +269,7 @@ fn within<T>(hypothesis: &Hypothesis<T>, times: f64) -> bool {
 }
 
 fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
-    let left_over = structured(findings) && !within(&selection.selected, AT_THE_NOISE);
+    let left_over = structured(findings) && !within(&selection.selected, HARDLY_ABOVE);
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
         return match left_over || !within(&selection.selected, FAR_ABOVE_THE_NOISE) {

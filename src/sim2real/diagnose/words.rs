@@ -22,8 +22,16 @@ pub(super) fn summary<T: Twin>(
     let gained = best.map_or_else(String::new, gained);
     match verdict {
         Verdict::Named => {
-            let sure = effects.iter().map(|e| format!("{} ({} sure)", title(&e.mechanism), percent(e.confidence)));
-            format!("The {name} leaves out {}: with that modelled, {gained}.", listed(&sure.collect::<Vec<_>>()))
+            let sure: Vec<String> = effects.iter().map(|e| percent(e.confidence)).collect();
+            let alike = sure.iter().all(|s| *s == sure[0]);
+            let found = match sure.first() {
+                Some(first) if alike => format!("{names} ({}{first} sure)", if sure.len() > 1 { "each " } else { "" }),
+                _ => {
+                    let each = effects.iter().zip(&sure).map(|(e, sure)| format!("{} ({sure} sure)", title(&e.mechanism)));
+                    listed(&each.collect::<Vec<_>>())
+                }
+            };
+            format!("The {name} leaves out {found}: with that modelled, {gained}.")
         }
         Verdict::Ambiguous => {
             let sure = effects.iter().map(|e| {

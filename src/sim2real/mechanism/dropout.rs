@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Signs, Site, Thetas, Typical};
 
 /// With `probability` a row repeats the row before, in all channels: a message was lost, and what reads the sensor holds
 /// the last. In the form `bursts`, losses begin with `probability` and last `length` rows in the mean, as of a bus that is
@@ -46,6 +46,16 @@ where
 
     fn followed(&self, _form: usize) -> bool {
         false
+    }
+
+    /// Single losses are independent, longer runs of them are bursts.
+    fn recognized(&self, form: usize, signs: &Signs) -> Option<Vec<f64>> {
+        let bursts = signs.run > 1.5;
+        match form {
+            _ if signs.repeated <= 0.0 || bursts != (form == 1) => None,
+            0 => Some(vec![signs.repeated]),
+            _ => Some(vec![signs.repeated / signs.run / (1.0 - signs.repeated).max(1e-3), signs.run]),
+        }
     }
 
     fn law(&self, form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<P>> {

@@ -32,6 +32,10 @@ where
         Form::only(vec![Parameter::new("step", "output", 0.0).within(0.0, f64::INFINITY).starting_at(&[start]).stepped()])
     }
 
+    fn finishing(&self, _form: usize) -> bool {
+        true
+    }
+
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         Box::new(Steps(thetas.row(0).to_vec()))
     }
