@@ -221,7 +221,14 @@ const CASES: &[Case] = &[
         law: |_, x, u| plain(x, u, -0.08 * x[1].abs().powf(1.6) * x[1]),
         most: 2e-5,
     },
-    Case { mechanism: "stiffness", form: "", values: &[1.5], law: |_, x, u| plain(x, u, -1.5 * x[0]), most: 2e-5 },
+    Case { mechanism: "stiffness", form: "straight", values: &[1.5], law: |_, x, u| plain(x, u, -1.5 * x[0]), most: 2e-5 },
+    Case {
+        mechanism: "stiffness",
+        form: "bent",
+        values: &[1.5, -0.3],
+        law: |_, x, u| plain(x, u, -1.5 * x[0] + 0.3 * x[0].powi(3)),
+        most: 2e-5,
+    },
     Case {
         mechanism: "cubic_stiffness",
         form: "",

@@ -44,7 +44,7 @@ impl FittedTwin {
             };
             parameters.iter().zip(estimates.by_ref()).map(one).collect()
         };
-        let own = fitted(&assembly.plant().parameters(), false);
+        let own = fitted(assembly.own(), false);
         let mechanisms =
             assembly.mechanisms().map(|(row, _, parameters)| (row.about().name, fitted(parameters, true))).collect();
         Self { own, mechanisms }
@@ -64,7 +64,13 @@ impl FittedTwin {
     pub fn document(&self, file: &TwinFile) -> TwinFile {
         let mut out = file.clone();
         for fitted in self.own.iter().filter(|fitted| !fitted.frozen) {
-            out.parameters.insert(fitted.name.clone(), fitted.quantity());
+            let controller = out.controller.as_mut().zip(fitted.name.strip_prefix("controller."));
+            match controller.and_then(|(controller, key)| controller.parameter_mut(key)) {
+                Some(quantity) => *quantity = fitted.quantity(),
+                None => {
+                    out.parameters.insert(fitted.name.clone(), fitted.quantity());
+                }
+            }
         }
         let entry = |(id, all): &(&'static str, Vec<Fitted>)| {
             let before = file.mechanisms.iter().find(|entry| entry.name == *id);

@@ -6,6 +6,7 @@ use super::document::Document;
 use super::error::InputError;
 use super::quantity::{Exactly, Quantity};
 use super::twin_file::{exact_form, float, section, text};
+use crate::sim2real::DerivativeOf;
 
 /// `[controller]`: numbers without an uncertainty are known exactly, for a controller is what somebody has set.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -34,17 +35,6 @@ pub struct ControllerEntry {
 pub enum ControllerKind {
     /// Proportional, integral and derivative.
     Pid,
-}
-
-/// What a controller's derivative is taken of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DerivativeOf {
-    /// The measurement: a jump of the set point is no kick.
-    #[default]
-    Measurement,
-    /// The error.
-    Error,
 }
 
 impl ControllerEntry {

@@ -27,7 +27,7 @@ mod twin_mechanism;
 mod unit;
 
 pub use check::{Increase, check_increasing, check_not_negative, check_positive};
-pub use controller_entry::{ControllerEntry, ControllerKind, DerivativeOf};
+pub use controller_entry::{ControllerEntry, ControllerKind};
 pub use document::{Document, read_toml};
 pub use equation_sections::{AttachEntry, EquationSections, InputEntry, OutputEntry, StateEntry};
 pub use error::{InputError, Place, did_you_mean, hint_among, listed};

@@ -205,6 +205,10 @@ impl TwinFile {
             return Err(error.hint("it is for `model = \"equations\"`"));
         }
         if let Some(controller) = &table.controller {
+            if table.twin.model == "execution" {
+                let error = document.error(&["controller"], "orders have no controller");
+                return Err(error.hint("leave [controller] out: it closes the loop of what moves"));
+            }
             controller.check(&document)?;
         }
         let market = table.market.map(|market| market_files(&document, market)).transpose()?;

@@ -218,9 +218,14 @@ fn parameters(entries: &[Entry]) -> [Figure; 2] {
             }
         }
     }
-    let error =
-        |pairs: &[Pair]| Figure::quantile("parameters off by, median", Unit::Share, 0.5, pairs.iter().map(Pair::error));
-    let covered = |pairs: &[Pair]| Figure::share("95 % intervals of parameters hold", pairs.iter().map(Pair::covered));
+    let error = |pairs: &[Pair]| {
+        Figure::quantile("parameters off by", Unit::Share, 0.5, pairs.iter().map(Pair::error))
+            .meaning("median, of mechanisms rightly named, where forms can be compared")
+    };
+    let covered = |pairs: &[Pair]| {
+        Figure::share("intervals hold", pairs.iter().map(Pair::covered))
+            .meaning("95 % intervals of the same parameters that hold the truth")
+    };
     let coverage = Goal { until: Some(0.97), ..Goal::new(0.85, 0.93) };
     [
         Figure { oracle: error(&told).value, ..error(&own).wanting(Goal::new(0.10, 0.03)) },
@@ -228,14 +233,10 @@ fn parameters(entries: &[Entry]) -> [Figure; 2] {
     ]
 }
 
-/// The parameters of an effect that can be compared. Forms of a mechanism have names of their own for the same thing.
+/// The parameters of an effect that can be compared: those that the form found has in common with the truth.
 fn pairs(effect: &Concealed, fitted: impl Fn(&str) -> Option<Fitted>) -> Vec<Pair> {
     let comparable = effect.parameters.iter().filter(|(name, truth)| name.as_str() != "time" && **truth != 0.0);
-    let pair = |(name, truth): (&String, &f64)| {
-        let alias = if name == "time_constant" { "total_time".to_owned() } else { format!("soft_{name}") };
-        Some(Pair { fitted: fitted(name).or_else(|| fitted(&alias))?, truth: *truth })
-    };
-    comparable.filter_map(pair).collect()
+    comparable.filter_map(|(name, truth)| Some(Pair { fitted: fitted(name)?, truth: *truth })).collect()
 }
 
 /// Held-out errors over the oracle's, of cases with one or two effects.

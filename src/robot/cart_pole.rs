@@ -294,7 +294,7 @@ mod tests {
             Measured { channel: "position".into(), unit: "m".into(), samples: samples(&|t| 0.2 * (2.0 * t).sin()) },
             Measured { channel: "angle".into(), unit: "rad".into(), samples: samples(&|t| 3.0 + 0.2 * (4.0 * t).sin()) },
         ];
-        let commands = time.iter().map(|t| 1.5 * (2.0 * t).sin() + (5.0 * t).cos()).collect();
+        let commands = time.iter().map(|t| (5.0 * t).cos() - 0.6 * (2.0 * t).sin()).collect();
         Recording { name: "hanging".into(), stimulus: Commands(commands), measured, time }
     }
 

@@ -205,6 +205,7 @@ impl Plant for Equations {
         match declared {
             "output" => return output.to_string(),
             "output/s" => return format!("{output}/s"),
+            "1/output^2" => return format!("1/{output}^2"),
             "command" => return command.to_owned(),
             "command/s" => return format!("{command}/s"),
             _ => {}

@@ -29,7 +29,7 @@ const PARAMETERS: [(&str, [&str; 2]); 4] = [
 ];
 
 /// The other units that mechanisms of a joint declare, each with what it is on a linear axis.
-const LINEAR: [(&str, &str); 8] = [
+const LINEAR: [(&str, &str); 9] = [
     ("N m", "N"),
     ("N m/rad", "N/m"),
     ("N m/rad^3", "N/m^3"),
@@ -38,6 +38,7 @@ const LINEAR: [(&str, &str); 8] = [
     ("rad/s", "m/s"),
     ("rad/(N m)", "m/N"),
     ("1/rad", "1/m"),
+    ("1/rad^2", "1/m^2"),
 ];
 
 /// How a joint moves: its units follow.
@@ -56,6 +57,7 @@ impl Axis {
         let declared = match declared {
             "output" => "rad",
             "output/s" => "rad/s",
+            "1/output^2" => "1/rad^2",
             "command" => return "unit of the command".to_owned(),
             "command/s" => return "units of the command/s".to_owned(),
             other => other,

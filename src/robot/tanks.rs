@@ -156,6 +156,7 @@ impl Plant for Tanks {
         match declared {
             "output" => self.channels[0].unit.to_string(),
             "output/s" => format!("{}/s", self.channels[0].unit),
+            "1/output^2" => format!("1/{}^2", self.channels[0].unit),
             "command" => "unit of the command".to_owned(),
             "command/s" => "units of the command/s".to_owned(),
             other => other.to_owned(),

@@ -10,10 +10,10 @@ use std::path::Path;
 
 use super::Commands;
 use crate::io::{
-    ChannelEntry, InputError, Need, Quantity, TIME_COLUMN, TrajectoryTable, TwinFile, hint_among, listed_mechanism,
-    read_trajectory,
+    ChannelEntry, ControllerEntry, ControllerKind, InputError, Need, Quantity, TIME_COLUMN, TrajectoryTable, TwinFile,
+    hint_among, listed_mechanism, read_trajectory,
 };
-use crate::sim2real::{Assembly, Measured, Plant, Recording, Registry};
+use crate::sim2real::{Assembly, Measured, Parameter, Pid, Plant, Recording, Registry};
 
 pub use cart_pole::{cart_pole_assembly, cart_pole_recordings};
 pub use equations::{equations_assembly, equations_recordings};
@@ -89,13 +89,33 @@ fn parameter(twin: &TwinFile, wanted: &Wanted) -> Result<Quantity, InputError> {
 }
 
 /// The plant with the mechanisms that the twin lists.
-fn assembly<P: Plant>(twin: &TwinFile, plant: P, registry: Registry<P>) -> Result<Assembly<P>, InputError> {
+fn assembly<P: Plant>(twin: &TwinFile, plant: P, registry: Registry<P>) -> Result<Assembly<P>, InputError>
+where
+    P::Command: AsMut<f64>,
+{
     let mut assembly = Assembly::new(plant.clone(), registry);
+    if let Some(controller) = &twin.controller {
+        assembly = assembly.controlled_by(pid(controller));
+    }
     for (index, entry) in twin.mechanisms.iter().enumerate() {
         let (mechanism, form, parameters) = listed_mechanism(twin.document(), index, entry, &plant, registry)?;
         assembly = assembly.with_mechanism(mechanism, form, parameters);
     }
     Ok(assembly)
+}
+
+/// The controller of a twin.
+fn pid(entry: &ControllerEntry) -> Pid {
+    let parameter = |(key, quantity): (&'static str, &Quantity)| {
+        let unit = quantity.unit.clone().unwrap_or_default();
+        let parameter = Parameter::named(key, unit, quantity.value).known_to(quantity.std());
+        // A limit below 0 is none.
+        if key == "limit" { parameter.within(1e-3 * quantity.value, f64::INFINITY) } else { parameter }
+    };
+    let ControllerKind::Pid = entry.kind;
+    let mut pid = Pid::new(entry.parameters().into_iter().map(parameter));
+    (pid.period, pid.derivative) = (entry.period, entry.derivative);
+    pid
 }
 
 /// Holds the twin to be of the model `name`.

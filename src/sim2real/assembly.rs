@@ -5,8 +5,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::{
-    About, Candidate, Channel, Clock, Covariate, Dynamics, Law, Measured, Mechanism, Observation, Parameter, Plant,
-    Recording, Scene, Seed, Signs, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+    About, Candidate, Channel, Clock, Controller, Covariate, Dynamics, Feedback, Law, Measured, Mechanism, Observation,
+    Parameter, Plant, Recording, Scene, Seed, Signs, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
+    Typical,
 };
 
 /// The mechanisms a domain knows: one row each.
@@ -29,6 +30,8 @@ impl<P: Plant> Clone for Part<P> {
 pub struct Assembly<P: Plant> {
     plant: Arc<P>,
     registry: Registry<P>,
+    /// What closes the loop, where it is closed.
+    controller: Option<Arc<dyn Controller<P>>>,
     parts: Vec<Part<P>>,
     parameters: Vec<Parameter>,
     excluded: Vec<String>,
@@ -52,6 +55,7 @@ impl<P: Plant> Assembly<P> {
             parameters: plant.parameters(),
             plant: Arc::new(plant),
             registry,
+            controller: None,
             parts: Vec::new(),
             excluded: Vec::new(),
             step: None,
@@ -79,6 +83,24 @@ impl<P: Plant> Assembly<P> {
         self
     }
 
+    /// Closes the loop: commands are set points of the first channel from now on. The controller's parameters follow the
+    /// plant's, whatever mechanisms there are.
+    #[must_use]
+    pub fn controlled_by(mut self, controller: impl Controller<P> + 'static) -> Self {
+        let at = self.plant.parameters().len();
+        let old = self.own().len() - at;
+        self.parameters.splice(at..at + old, controller.parameters());
+        self.controller = Some(Arc::new(controller));
+        self
+    }
+
+    /// The parameters of the plant and its controller, before those of mechanisms.
+    #[must_use]
+    pub fn own(&self) -> &[Parameter] {
+        let controller = self.controller.as_ref().map_or(0, |c| c.parameters().len());
+        &self.parameters[..self.plant.parameters().len() + controller]
+    }
+
     /// Adds a mechanism in one of its forms, with the values its parameters have today.
     #[must_use]
     pub fn with_mechanism(mut self, mechanism: &'static dyn Mechanism<P>, form: usize, parameters: Vec<Parameter>) -> Self {
@@ -90,7 +112,7 @@ impl<P: Plant> Assembly<P> {
     /// The mechanisms it has, in the order in which their parameters follow the plant's, each with the number of its
     /// form and these parameters.
     pub fn mechanisms(&self) -> impl Iterator<Item = (&'static dyn Mechanism<P>, usize, &[Parameter])> {
-        let mut at = self.plant.parameters().len();
+        let mut at = self.own().len();
         self.parts.iter().map(move |part| {
             let start = at;
             at += part.mechanism.forms(&Default::default())[part.form].parameters.len();
@@ -111,8 +133,11 @@ impl<P: Plant> Assembly<P> {
     #[must_use]
     pub fn run(&self, thetas: &Thetas, initial: &Thetas, seed: Seed) -> Run<P> {
         let lanes = thetas.lanes();
-        let dynamics = self.plant.dynamics(&thetas.block(0, self.plant.parameters().len()));
+        let plant = self.plant.parameters().len();
+        let dynamics = self.plant.dynamics(&thetas.block(0, plant));
+        let mut at = self.own().len();
         let mut run = Run {
+            controller: self.controller.as_ref().map(|c| c.feedback(&thetas.block(plant, at - plant))),
             states: dynamics.initial(initial),
             dynamics,
             command_laws: Vec::new(),
@@ -123,7 +148,6 @@ impl<P: Plant> Assembly<P> {
             inputs: Vec::with_capacity(lanes),
             observations: vec![P::Observation::default(); lanes],
         };
-        let mut at = self.plant.parameters().len();
         for part in &self.parts {
             let about = part.mechanism.about();
             let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
@@ -142,6 +166,7 @@ impl<P: Plant> Assembly<P> {
 
 /// A running assembly: all lanes, one step at a time.
 pub struct Run<P: Plant> {
+    controller: Option<Box<dyn Feedback<P>>>,
     dynamics: P::Dynamics,
     command_laws: Vec<Box<dyn Law<P>>>,
     plant_laws: Vec<Box<dyn Law<P>>>,
@@ -160,10 +185,38 @@ impl<P: Plant> fmt::Debug for Run<P> {
 }
 
 impl<P: Plant> Run<P> {
-    /// Sends one command to every lane and gives it as it arrives, one a lane.
+    /// Sends one command to every lane and gives it as it arrives, one a lane. Where there is a controller, the command is its
+    /// set point, and it acts on what was last observed.
     pub fn send(&mut self, tick: Tick, command: &P::Command) -> &mut [P::Command] {
         self.commands.clear();
         self.commands.resize(self.states.len(), command.clone());
+        if let Some(controller) = &mut self.controller {
+            controller.act(tick.time, &self.observations, &mut self.commands);
+        }
+        self.shape(tick)
+    }
+
+    /// The same before the plant moves, where a controller can see no more than what was measured: its first channel, if at
+    /// all.
+    fn send_before(&mut self, tick: Tick, command: &P::Command, measured: Option<f64>) {
+        self.commands.clear();
+        self.commands.resize(self.states.len(), command.clone());
+        match (&mut self.controller, measured) {
+            (Some(controller), Some(measured)) => controller.act_on_measured(tick.time, measured, &mut self.commands),
+            // What it gave is not known.
+            (Some(_), None) => return,
+            (None, _) => {}
+        }
+        self.shape(tick);
+    }
+
+    /// Whether a controller has to see the plant at `time` [s].
+    fn watched(&self, time: f64) -> bool {
+        self.controller.as_ref().is_some_and(|controller| controller.due(time))
+    }
+
+    /// Shapes the commands on their way.
+    fn shape(&mut self, tick: Tick) -> &mut [P::Command] {
         for law in &mut self.command_laws {
             law.shape(tick, &mut self.commands);
         }
@@ -215,6 +268,12 @@ impl<P: Plant> Run<P> {
     pub fn rejoin(&mut self) {
         if let Some((first, others)) = self.states.split_first_mut() {
             others.iter_mut().for_each(|state| state.clone_from(first));
+        }
+        if let Some(controller) = &mut self.controller {
+            controller.rejoin();
+            if let Some((first, others)) = self.observations.split_first_mut() {
+                others.iter_mut().for_each(|observation| observation.clone_from(first));
+            }
         }
     }
 
@@ -310,6 +369,21 @@ impl<P: Plant> Simulator for Assembly<P> {
 }
 
 impl<P: Plant> Assembly<P> {
+    /// What is typical of the recordings: of commands, what a controller gave.
+    fn typical(&self, recordings: &[Recording<P::Stimulus>]) -> Typical {
+        let typical = self.plant.typical(recordings);
+        let (Some(controller), Some(channel)) = (&self.controller, self.channels().first()) else { return typical };
+        let given = recordings.iter().flat_map(|recording| controller.given(recording, &channel.name));
+        let (sum, count) = given.fold((0.0, 0), |(sum, count), u| (sum + u * u, count + 1));
+        let command = (sum / f64::from(count.max(1))).sqrt();
+        if command <= 0.0 || !command.is_finite() {
+            return typical;
+        }
+        // Efforts are told in proportion to commands.
+        let effort = if typical.command > 0.0 { typical.effort * command / typical.command } else { typical.effort };
+        Typical { command, effort, ..typical }
+    }
+
     /// Follows `rows`; every `every` rows, if ever, all lanes go on from the state of the first.
     fn follow(
         &self,
@@ -334,6 +408,8 @@ impl<P: Plant> Assembly<P> {
         // What is on its way when a run starts is not lost, whatever row it starts from.
         let shaping = self.parts.iter().filter(|part| part.mechanism.site(part.form) == Site::Command);
         let memory = shaping.map(|part| part.mechanism.memory()).fold(0.0, f64::max);
+        let memory = memory + self.controller.as_ref().map_or(0.0, |controller| controller.memory());
+        let seen = self.channels().first().and_then(|channel| recording.channel(&channel.name));
         let since = recording.time[rows.start] - memory;
         let warm = recording.time[..rows.start].partition_point(|t| *t < since);
         for row in warm..rows.end {
@@ -350,10 +426,18 @@ impl<P: Plant> Assembly<P> {
             for sub in 0..substeps {
                 let tick = Tick { index: row, time: time + sub as f64 * step, step };
                 let share = (sub as f64 + 0.5) / substeps as f64;
-                run.send(tick, &recording.stimulus.command_within(row, share));
-                if row >= rows.start {
-                    run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
+                let command = recording.stimulus.command_within(row, share);
+                if row < rows.start {
+                    let along = sub as f64 / substeps as f64;
+                    run.send_before(tick, &command, seen.and_then(|seen| between(seen, row, along)));
+                    continue;
                 }
+                // The row itself has been observed.
+                if sub > 0 && run.watched(tick.time) {
+                    run.observe(tick.time);
+                }
+                run.send(tick, &command);
+                run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
             }
         }
     }
@@ -367,6 +451,12 @@ impl<P: Plant> Assembly<P> {
             out.record(run, tick.time);
         }
     }
+}
+
+/// The sample `along` of the way from a row to the next, on a straight line; none where one was lost.
+fn between(measured: &Measured, row: usize, along: f64) -> Option<f64> {
+    let (from, to) = (measured.samples[row]?, measured.samples[row + 1]?);
+    Some(from + along * (to - from))
 }
 
 /// Collects observations, lane by lane and channel by channel.
@@ -402,7 +492,7 @@ impl Follow {
 
 impl<P: Plant> Twin for Assembly<P> {
     fn candidates(&self, recordings: &[Recording<P::Stimulus>]) -> Vec<Candidate> {
-        let typical = self.plant.typical(recordings);
+        let typical = self.typical(recordings);
         let modelled = self.modelled();
         let mut candidates = Vec::new();
         for mechanism in self.registry {

@@ -7,6 +7,7 @@
 
 mod assembly;
 mod check;
+mod controller;
 pub mod diagnose;
 pub mod identify;
 pub mod mechanism;
@@ -20,6 +21,7 @@ mod time;
 
 pub use assembly::{Assembly, Registry, Run};
 pub use check::{Violation, check_mechanism, check_plant};
+pub use controller::{Controller, DerivativeOf, Feedback, Pid};
 pub use mechanism::{About, Form, Law, Mechanism, Scene, Signs, Site};
 pub use parameter::{Parameter, Thetas};
 pub use plant::{Channel, Clock, Command, Covariate, DelayLine, Dynamics, Observation, Plant, Stimulus, Typical};

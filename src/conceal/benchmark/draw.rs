@@ -14,7 +14,7 @@ use super::recipe::{FOREIGN, KNOWN, Recipe, UNREACHED, compatible, need};
 use super::scene::Scales;
 use super::sensor::{Noise, Sensor};
 use super::size::{Hideable, strength};
-use super::truth;
+use super::truth::{self, Met};
 use crate::conceal::{Column, Table};
 use crate::sim2real::Seed;
 
@@ -277,12 +277,13 @@ impl Set {
         let sizes = if absent { vec![0.0; dosed.len()] } else { self.sizes(dosed, &noise, &hideable) };
         let machine = Machine::new(self.arm, &learnt);
         let sensor = self.sensor(&learnt, 0);
+        let met = Met::of(&self.drives[0], motion);
         let concealed = dosed.iter().zip(&sizes).map(|((recipe, strength), size)| {
             let effect = recipe.at(*strength, &self.scales);
             Concealed {
                 id: recipe.id.to_owned(),
                 size: *size,
-                parameters: truth::parameters(recipe.id, &effect, &self.scales),
+                parameters: truth::parameters(recipe.id, &effect, &self.scales, &met),
                 onset: truth::onset(&effect).filter(|_| !absent),
                 active: if absent { Vec::new() } else { truth::active(&effect, &machine, &sensor, &self.drives[0], motion) },
             }

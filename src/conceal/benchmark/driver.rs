@@ -14,7 +14,6 @@ pub(super) struct Driver {
     poles: Option<(f64, f64)>,
     heat: Option<Heat>,
     sagging: Option<(f64, f64)>,
-    lopsided: f64,
     /// Mean lateness of commands and its standard deviation [s].
     pub bus: (f64, f64),
 }
@@ -44,7 +43,6 @@ impl Driver {
                 }
                 Effect::Bus { delay, jitter } => all.bus = (delay, jitter),
                 Effect::Foreign(Foreign::Sagging { depth, period }) => all.sagging = Some((depth, period)),
-                Effect::Foreign(Foreign::LopsidedDriver { excess }) => all.lopsided = excess,
                 _ => {}
             }
         }
@@ -73,9 +71,6 @@ impl Driver {
         }
         if let Some((depth, period)) = self.sagging {
             output *= 1.0 - depth * 0.5 * (1.0 - (std::f64::consts::TAU * time / period).cos());
-        }
-        if output > 0.0 {
-            output *= 1.0 + self.lopsided;
         }
         (output, rates)
     }

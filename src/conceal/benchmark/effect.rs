@@ -77,8 +77,6 @@ pub(super) enum Foreign {
     Clock { size: f64, period: f64 },
     /// A base that shakes up and down: gravity varies.
     ShakenBase { share: f64, frequency: f64 },
-    /// A driver that gives more one way than the other.
-    LopsidedDriver { excess: f64 },
     /// A bent shaft: viscous friction that depends on where the arm is.
     BentShaft { friction: f64, phase: f64 },
 }

@@ -44,7 +44,7 @@ pub struct Concealed {
     pub size: f64,
     /// Its true parameters, as far as a registry's of that name can be compared with them.
     pub parameters: BTreeMap<String, f64>,
-    /// When it began [s], where not from the start.
+    /// When it began [s], where not from the start: of what takes a while, the middle of that.
     pub onset: Option<f64>,
     /// When it acted, in the recording to learn from, where it acts at times only.
     pub active: Vec<Span>,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::effect::{Effect, Foreign};
 
 /// Time within which a mass is put on [s].
-const PUT_ON: f64 = 0.15;
+pub(super) const PUT_ON: f64 = 0.15;
 
 /// All effects inside the plant.
 #[derive(Debug, Clone, Default)]
@@ -277,10 +277,8 @@ fn strange(foreign: Foreign, now: &Instant, memory: f64) -> (f64, f64) {
         }
         Foreign::Memory { rate, time } => (rate * memory, now.velocity - memory / time),
         Foreign::BentShaft { friction, phase } => (friction * (1.0 + (now.position + phase).cos()) * now.velocity, 0.0),
-        Foreign::MovingInertia { .. }
-        | Foreign::Sagging { .. }
-        | Foreign::Clock { .. }
-        | Foreign::ShakenBase { .. }
-        | Foreign::LopsidedDriver { .. } => (0.0, 0.0),
+        Foreign::MovingInertia { .. } | Foreign::Sagging { .. } | Foreign::Clock { .. } | Foreign::ShakenBase { .. } => {
+            (0.0, 0.0)
+        }
     }
 }

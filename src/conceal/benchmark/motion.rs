@@ -94,7 +94,7 @@ pub(super) struct Machine {
     arm: Arm,
     driver: Driver,
     load: Load,
-    /// Whether anything acts: most runs are of arms alone, and many.
+    /// Whether nothing acts on its motion: most runs are of arms alone, and many.
     bare: bool,
 }
 
@@ -136,7 +136,7 @@ impl Machine {
                 (now, command) = (at.max(now), *next);
             }
             state = self.integrate(state, command, now, until - now, precision);
-            if !(state.position.abs() < 1e6) {
+            if state.position.is_nan() || state.position.abs() > 1e6 {
                 positions.resize(steps + 1, f64::NAN);
                 break;
             }
@@ -160,16 +160,22 @@ impl Machine {
 
     /// Integrates over `duration` [s] under one command, in steps that what is stiff can bear.
     fn integrate(&self, mut state: State, command: f64, mut time: f64, duration: f64, precision: Precision) -> State {
+        if duration <= 0.0 {
+            return state;
+        }
+        if let Precision::Euler(_) = precision {
+            return self.euler(state, command, time, duration);
+        }
+        if self.bare {
+            return self.swing(state, command, duration);
+        }
         let mut left = duration;
-        let driver = if self.bare { 0.0 } else { self.driver.fastest() };
+        let driver = self.driver.fastest();
         let patience = if precision == Precision::Fine { 0.7 } else { 1.6 };
         while left > 1e-12 {
-            if let Precision::Euler(_) = precision {
-                return self.euler(state, command, time, left);
-            }
             let rubbing = if self.load.coupling.is_some() { state.motor_velocity } else { state.velocity };
             let load = || self.load.fastest(self.arm.inertia, state.position, state.velocity, rubbing);
-            let fastest = if self.bare { 0.0 } else { driver.max(load()) };
+            let fastest = driver.max(load());
             let step = left.min(precision.step()).min(if fastest > 0.0 { patience / fastest } else { f64::INFINITY });
             let step = if left - step < 0.1 * step { left } else { step };
             state = self.runge_kutta(state, command, time, step);
@@ -192,13 +198,29 @@ impl Machine {
     fn moved(&self, mut state: State, step: f64, rate: &State) -> State {
         state.position += step * rate.position;
         state.velocity += step * rate.velocity;
-        if !self.bare {
-            state.motor_position += step * rate.motor_position;
-            state.motor_velocity += step * rate.motor_velocity;
-            state.driver.iter_mut().zip(&rate.driver).for_each(|(value, rate)| *value += step * rate);
-            state.load.iter_mut().zip(&rate.load).for_each(|(value, rate)| *value += step * rate);
-        }
+        state.motor_position += step * rate.motor_position;
+        state.motor_velocity += step * rate.motor_velocity;
+        state.driver.iter_mut().zip(&rate.driver).for_each(|(value, rate)| *value += step * rate);
+        state.load.iter_mut().zip(&rate.load).for_each(|(value, rate)| *value += step * rate);
         state
+    }
+
+    /// One step of an arm alone, as [`runge_kutta`](Self::runge_kutta) takes it.
+    fn swing(&self, state: State, command: f64, step: f64) -> State {
+        let Arm { inertia, viscous_friction, gravity_torque, gain, .. } = self.arm;
+        let (push, friction, gravity) = (gain * command / inertia, viscous_friction / inertia, gravity_torque / inertia);
+        let rate = |q: f64, v: f64| {
+            let weight = if gravity == 0.0 { 0.0 } else { gravity * q.sin() };
+            push - friction * v - weight
+        };
+        let (q, v, half) = (state.position, state.velocity, 0.5 * step);
+        let a1 = rate(q, v);
+        let (v2, a2) = (v + half * a1, rate(q + half * v, v + half * a1));
+        let (v3, a3) = (v + half * a2, rate(q + half * v2, v + half * a2));
+        let (v4, a4) = (v + step * a3, rate(q + step * v3, v + step * a3));
+        let position = q + step / 6.0 * (v + 2.0 * (v2 + v3) + v4);
+        let velocity = v + step / 6.0 * (a1 + 2.0 * (a2 + a3) + a4);
+        State { position, velocity, ..state }
     }
 
     fn euler(&self, state: State, command: f64, time: f64, step: f64) -> State {
@@ -210,12 +232,6 @@ impl Machine {
 
     /// Time derivatives of the state.
     fn rates(&self, state: &State, command: f64, time: f64) -> State {
-        if self.bare {
-            let Arm { inertia, viscous_friction, gravity_torque, gain, .. } = self.arm;
-            let weight = if gravity_torque == 0.0 { 0.0 } else { gravity_torque * state.position.sin() };
-            let velocity = (gain * command - viscous_friction * state.velocity - weight) / inertia;
-            return State { position: state.velocity, velocity, ..State::default() };
-        }
         let (output, driver) = self.driver.act(&state.driver, command, time);
         let (more_inertia, more_gravity) = self.load.mass(time);
         let gravity = (self.arm.gravity_torque + more_gravity) * self.load.gravity_factor(time);

@@ -40,7 +40,7 @@ pub(super) const KNOWN: [&str; 27] = [
 ];
 
 /// What no registry has.
-pub(super) const FOREIGN: [&str; 11] = [
+pub(super) const FOREIGN: [&str; 10] = [
     "moving_inertia",
     "shaking",
     "one_way_friction",
@@ -50,7 +50,6 @@ pub(super) const FOREIGN: [&str; 11] = [
     "viscoelastic_memory",
     "clock_wobble",
     "shaken_base",
-    "lopsided_driver",
     "bent_shaft",
 ];
 
@@ -210,7 +209,6 @@ impl Recipe {
             "viscoelastic_memory" => Foreign::Memory { rate: torque / scales.reach, time: self.between(0, 0.1, 0.6) },
             "clock_wobble" => Foreign::Clock { size: strength, period: self.between(0, 3.0, 9.0) },
             "shaken_base" => Foreign::ShakenBase { share: strength, frequency: self.between(0, 0.5, 3.0) },
-            "lopsided_driver" => Foreign::LopsidedDriver { excess: strength },
             _ => Foreign::BentShaft { friction: torque / scales.speed, phase },
         }
     }
@@ -239,7 +237,7 @@ fn range(id: &str) -> (f64, f64) {
         "backlash" => (1e-4, 0.6),
         "rectification" => (1e-3, 1.0),
         "dropout" => (2e-3, 0.5),
-        "scale" | "lopsided_driver" => (1e-3, 0.5),
+        "scale" => (1e-3, 0.5),
         "eccentricity" => (1e-4, 0.5),
         "moving_inertia" | "sagging_supply" | "shaken_base" => (2e-3, 0.75),
         "clock_wobble" => (1e-5, 0.1),

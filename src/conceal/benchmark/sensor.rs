@@ -79,7 +79,7 @@ impl Sensor {
 
     /// What is recorded of `motion`, with a noise of standard deviation 1 given.
     pub fn measure(&self, motion: &Motion, drive: &Drive, noise: &[f64]) -> Vec<f64> {
-        let mut counted = f64::NAN;
+        let mut counted = None;
         let mut read: Vec<f64> = (0..drive.commands.len())
             .map(|row| {
                 let time = drive.time(row);
@@ -118,17 +118,17 @@ impl Sensor {
     }
 
     /// The step a value is counted as; with a hysteresis of a tenth of a step where that is concealed.
-    fn counted(&self, value: f64, last: &mut f64) -> f64 {
+    fn counted(&self, value: f64, last: &mut Option<f64>) -> f64 {
         let concealed = self.effects.iter().find_map(|effect| match effect {
             Effect::Counts { step } => Some(*step),
             _ => None,
         });
         match (concealed, self.kind) {
             (Some(step), _) => {
-                if !((value - *last).abs() < 0.55 * step) {
-                    *last = (value / step).round() * step;
-                }
-                *last
+                let kept = last.filter(|last| (value - last).abs() < 0.55 * step);
+                let count = kept.unwrap_or_else(|| (value / step).round() * step);
+                *last = Some(count);
+                count
             }
             (None, Noise::Counted(part)) => {
                 let step = part * self.noise;

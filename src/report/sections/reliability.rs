@@ -26,16 +26,13 @@ impl Section for ReliabilityPlot<'_> {
             return Ok(String::new());
         }
         let said: Vec<f64> = bins.iter().map(|(said, _, _)| *said).collect();
-        let right = || bins.iter().map(|(_, right, _)| Some(*right)).collect();
+        let right: Vec<Option<f64>> = bins.iter().map(|(_, right, _)| Some(*right)).collect();
         let plot = Plot {
             alt: "Share of names that are right over the confidence they were given with".to_owned(),
             x_label: "confidence".to_owned(),
             y_label: "share that is right".to_owned(),
             scale: Scale::Number,
-            curves: vec![
-                Curve { ink: Ink::Trued, mark: Mark::Line, x: &said, y: right() },
-                Curve { ink: Ink::Trued, mark: Mark::Dots, x: &said, y: right() },
-            ],
+            curves: vec![Curve { ink: Ink::Trued, mark: Mark::Dots, x: &said, y: right }],
             shades: Vec::new(),
             zero: false,
             diagonal: true,

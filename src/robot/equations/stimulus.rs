@@ -91,4 +91,13 @@ impl Stimulus<Equations> for Driving {
     fn input(&self, row: usize, _arriving: &Signal) -> Measurements {
         self.measured.get(row).cloned().unwrap_or_default()
     }
+
+    fn commands(&self) -> Option<&[f64]> {
+        Some(&self.commands)
+    }
+
+    /// Only where nothing else drives it: what an experiment would measure is not known.
+    fn commanded(&self, commands: Vec<f64>) -> Option<Self> {
+        self.measured.is_empty().then(|| Self { commands, ..self.clone() })
+    }
 }

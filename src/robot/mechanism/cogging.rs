@@ -41,7 +41,7 @@ impl<P: Mover> Mechanism<P> for Cogging {
         let waves = TAU / (typical.range[1] - typical.range[0]).max(1e-9);
         let numbers: Vec<f64> = (2..=WAVES).map(|n| f64::from(n) * waves).collect();
         let number = Parameter::new("wave_number", "1/rad", waves).within(0.5 * waves.min(1.0), f64::INFINITY);
-        let counts = Parameter::new("counts", "", 4.0).within(3.0, f64::INFINITY);
+        let counts = Parameter::new("counts", "", 3.5).within(3.0, f64::INFINITY);
         vec![
             Form { name: "per_turn", parameters: vec![amplitude("sine"), amplitude("cosine"), counts.starting_at(&COUNTS)] },
             Form {

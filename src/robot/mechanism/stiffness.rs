@@ -27,8 +27,10 @@ impl<P: Mover> Mechanism<P> for Stiffness {
         let starts = [0.05, 0.3].map(|fraction| fraction * typical.effort / typical.output.max(1e-12));
         let rate =
             |name| Parameter::new(name, "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts).proportional();
-        let thirds = [0.02, -0.02].map(|fraction| fraction * typical.effort / typical.output.powi(3).max(1e-12));
-        let third = Parameter::new("third_rate", "N m/rad^3", 0.0).starting_at(&thirds).proportional();
+        // One that softens gives way far out: its sign is solved for, not tried.
+        let third = Parameter::new("third_rate", "N m/rad^3", 0.0)
+            .starting_at(&[0.02 * typical.effort / typical.output.powi(3).max(1e-12)])
+            .proportional();
         vec![
             Form { name: "straight", parameters: vec![rate("rate")] },
             Form { name: "bent", parameters: vec![rate("bent_rate"), third] },
@@ -47,11 +49,13 @@ struct BentSpring {
 }
 
 impl<P: Mover> Law<P> for BentSpring {
-    fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let lanes = effects.iter_mut().zip(scene.states).zip(self.rates.iter().zip(&self.thirds));
         for ((effect, state), (rate, third)) in lanes {
-            let position = P::motion(state).position;
-            P::push(effect).stiffness += rate + third * position * position;
+            let motion = P::motion(state);
+            // Springs act from where the coordinate is in the middle of the step.
+            let midway = motion.position + 0.5 * tick.step * motion.velocity;
+            P::push(effect).stiffness += rate + third * midway * midway;
         }
     }
 }

@@ -97,7 +97,8 @@ pub(super) struct Left {
 /// The share of the held-out squared residual that a regression on the covariates, learnt on the fitted rows, foretells.
 ///
 /// For sampled signals, whose residuals depend on one another: noise, however coloured, is not foretold on data the
-/// regression has not seen; missing physics is. Each covariate enters with its square, its sign and its past.
+/// regression has not seen; missing physics is. Each covariate enters with its square, its sign, its past, and
+/// multiplied by time.
 pub(super) fn foretold(fitted: &[Left], held_out: &[Left], covariates: &BTreeMap<usize, Vec<Covariate>>) -> f64 {
     let (Some(train), Some(test)) = (stack(fitted, covariates), stack(held_out, covariates)) else { return 0.0 };
     let (design, target) = train;
@@ -129,6 +130,9 @@ const ROWS: usize = 6_000;
 /// Lags, in rows, at which covariates enter the regression: what acts inside a plant shows in its output for a while.
 const LAGS: [usize; 7] = [0, 6, 15, 30, 60, 100, 160];
 
+/// Of these, those at which they enter by time as well.
+const LATER: [usize; 4] = [0, 15, 60, 160];
+
 fn stack(pieces: &[Left], covariates: &BTreeMap<usize, Vec<Covariate>>) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let mut target = Vec::new();
@@ -139,10 +143,13 @@ fn stack(pieces: &[Left], covariates: &BTreeMap<usize, Vec<Covariate>>) -> Optio
         let Some(columns) = covariates.get(&piece.recording) else { continue };
         for (value, row) in piece.residual.iter().zip(&piece.rows).step_by(step) {
             let features = columns.iter().flat_map(|(_, c)| {
-                LAGS.iter().flat_map(move |lag| {
+                let now = LAGS.iter().flat_map(move |lag| {
                     let v = c[row.saturating_sub(*lag)];
                     [v, v * v, v * v.abs(), if v > 0.0 { 1.0 } else { -1.0 }]
-                })
+                });
+                // What changes with time, as oil that warms, shows in how the same motion is answered later.
+                let later = LATER.iter().map(move |lag| c[row.saturating_sub(*lag)] * *row as f64);
+                now.chain(later)
             });
             rows.push(features.collect());
             target.push(*value);

@@ -26,6 +26,8 @@ const FORETOLD_WELL: f64 = 0.25;
 const FAR_ABOVE_THE_NOISE: f64 = 9.0;
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
 const AT_THE_NOISE: f64 = 1.5;
+/// What a regression foretells counts where the mean squared residual is more than this many times the noise.
+const HARDLY_ABOVE: f64 = 1.2;
 /// With fewer rows than this, what is not explained is not called explained either.
 const FEWEST_ROWS: usize = 50;
 /// Confidence in what needs no fit to be seen.
@@ -267,7 +269,7 @@ fn within<T>(hypothesis: &Hypothesis<T>, times: f64) -> bool {
 }
 
 fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
-    let left_over = structured(findings) && !within(&selection.selected, AT_THE_NOISE);
+    let left_over = structured(findings) && !within(&selection.selected, HARDLY_ABOVE);
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
         return match left_over || !within(&selection.selected, FAR_ABOVE_THE_NOISE) {

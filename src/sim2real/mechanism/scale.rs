@@ -2,9 +2,10 @@
 
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
-/// `y -> (1 + error) y`, on the plant's first channel: a wrong count of pulses per turn, of teeth, or of volts.
+/// `y -> (1 + error) y`, on the plant's first channel: a wrong count of pulses per turn, of teeth, or of volts; in the form
+/// `bent`, `y -> (1 + bent_error + bow y^2) y`, as of a potentiometer, which is not quite straight either.
 ///
-/// Source: scale factor error, IEEE Std 528-2019, *Inertial Sensor Terminology*.
+/// Source: scale factor error and scale factor nonlinearity, IEEE Std 528-2019, *Inertial Sensor Terminology*.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale;
 
@@ -17,20 +18,45 @@ where
             name: "scale",
             site: Site::Observation,
             title: "a wrong scale of the sensor",
-            law: "y -> (1 + error) y",
+            law: "y -> (1 + error) y; bent: y -> (1 + bent_error + bow y^2) y",
             source: "scale factor error, IEEE Std 528-2019, Inertial Sensor Terminology",
             remedy: "move the axis over a known distance; correct the factor from counts to units",
             contains: &[],
         }
     }
 
-    fn forms(&self, _typical: &Typical) -> Vec<Form> {
+    fn forms(&self, typical: &Typical) -> Vec<Form> {
         // A factor that turns the sign or hides the motion altogether is another fault than this.
-        Form::only(vec![Parameter::new("error", "", 0.0).within(-0.95, 10.0).starting_at(&[0.05, -0.05]).proportional()])
+        let error = |name| Parameter::new(name, "", 0.0).within(-0.95, 10.0).starting_at(&[0.05, -0.05]).proportional();
+        let bows = [0.02, -0.02].map(|part| part / (typical.output * typical.output).max(1e-12));
+        let bow = Parameter::new("bow", "1/output^2", 0.0).starting_at(&bows).proportional();
+        vec![
+            Form { name: "straight", parameters: vec![error("error")] },
+            Form { name: "bent", parameters: vec![error("bent_error"), bow] },
+        ]
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Factor(thetas.row(0).iter().map(|error| 1.0 + error).collect()))
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let factor = thetas.row(0).iter().map(|error| 1.0 + error).collect();
+        if form == 0 { Box::new(Factor(factor)) } else { Box::new(BentFactor { factor, bow: thetas.row(1).to_vec() }) }
+    }
+}
+
+struct BentFactor {
+    factor: Vec<f64>,
+    bow: Vec<f64>,
+}
+
+impl<P: Plant> Law<P> for BentFactor
+where
+    P::Observation: AsMut<[f64]>,
+{
+    fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
+        for ((observation, factor), bow) in observations.iter_mut().zip(&self.factor).zip(&self.bow) {
+            if let Some(y) = observation.as_mut().first_mut() {
+                *y *= factor + bow * *y * *y;
+            }
+        }
     }
 }
 
@@ -60,5 +86,7 @@ mod tests {
         let out = sensed(&Scale, 0, &[&[0.25], &[-0.5]], 1, &rows);
         assert_eq!(out[0], [[-2.5, 1.0], [0.0, 1.0], [5.0, 1.0]]);
         assert_eq!(out[1], [[-1.0, 1.0], [0.0, 1.0], [2.0, 1.0]]);
+        let bent = sensed(&Scale, 1, &[&[0.25, 0.5]], 1, &rows);
+        assert_eq!(bent[0], [[-6.5, 1.0], [0.0, 1.0], [37.0, 1.0]]);
     }
 }
