@@ -78,12 +78,7 @@ const BAM_200: [&str; 3] =
 const BAM_400: [&str; 3] =
     ["bam_xl330/kp400_lift_and_drop.csv", "bam_xl330/kp400_sin_sin.csv", "bam_xl330/kp400_up_and_down.csv"];
 
-const fn bam(
-    name: &'static str,
-    twin: &'static str,
-    train: &'static [&'static str],
-    test: &'static [&'static str],
-) -> Set {
+const fn bam(name: &'static str, twin: &'static str, train: &'static [&'static str], test: &'static [&'static str]) -> Set {
     Set {
         name,
         twin,

@@ -49,7 +49,8 @@ pub(super) fn signs<T: Simulator>(twin: &T, recordings: &[Recording<T::Stimulus>
         repeated += stale.iter().filter(|s| **s).count();
         runs += stale.iter().zip(std::iter::once(&false).chain(&stale)).filter(|(now, before)| **now && !**before).count();
     }
-    if repeated < FEWEST {
+    // A signal that hardly ever changes has nothing to lose.
+    if repeated < FEWEST || 2 * repeated > samples {
         return Signs::default();
     }
     Signs { repeated: repeated as f64 / samples as f64, run: repeated as f64 / runs.max(1) as f64 }
