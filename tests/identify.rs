@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
-use trueup::sim2real::identify::{Problem, State, fit};
+use trueup::sim2real::identify::{Effort, Problem, State, fit};
 use trueup::sim2real::{Assembly, ChannelWeight, Measured, Part, Recording, Seed, Simulator, Thetas, Twin};
 
 const TRUTH: [f64; 4] = [0.10, 0.30, 2.5, 1.0];
@@ -32,7 +32,7 @@ fn recovers_the_parameters_behind_exact_data() {
     let (parts, weights) = ([Part::whole(&recording)], weights());
     let problem = Problem { simulator: &simulator, parts: &parts, weights: &weights, seed: Seed(0) };
     let start: Vec<f64> = simulator.parameters().iter().map(|p| p.nominal).collect();
-    let found = fit(&problem, &start, &[0, 1, 2], &State::estimated(&problem));
+    let found = fit(&problem, std::slice::from_ref(&start), &[0, 1, 2], &State::estimated(&problem), Effort::Thorough);
     for (k, truth) in TRUTH.into_iter().enumerate().take(3) {
         assert!((found.values[k] / truth - 1.0).abs() < 2e-3, "{k}: {:?}", found.values);
         assert!(found.std[k] > 0.0 && found.std[k] < 0.02 * truth);
@@ -52,7 +52,7 @@ fn reveals_what_the_data_do_not_determine() {
     let (parts, weights) = ([Part::whole(&recording)], weights());
     let problem = Problem { simulator: &simulator, parts: &parts, weights: &weights, seed: Seed(0) };
     let start: Vec<f64> = simulator.parameters().iter().map(|p| p.nominal).collect();
-    let found = fit(&problem, &start, &[0, 1, 2, 3], &State::estimated(&problem));
+    let found = fit(&problem, std::slice::from_ref(&start), &[0, 1, 2, 3], &State::estimated(&problem), Effort::Thorough);
     assert_eq!(found.rank, 3, "{:?}", found.std);
     let ratio = |k: usize| found.values[k] / found.values[3] / TRUTH[k];
     assert!((0..3).all(|k| (ratio(k) - 1.0).abs() < 2e-3), "{:?}", found.values);
@@ -70,6 +70,6 @@ fn says_which_parameters_ended_at_a_bound() {
     let (parts, weights) = ([Part::whole(&recording)], weights());
     let problem = Problem { simulator: &simulator, parts: &parts, weights: &weights, seed: Seed(0) };
     let start: Vec<f64> = TRUTH.into_iter().chain([friction.form.parameters[0].starts[0]]).collect();
-    let found = fit(&problem, &start, &[0, 1, 2, 4], &State::estimated(&problem));
+    let found = fit(&problem, std::slice::from_ref(&start), &[0, 1, 2, 4], &State::estimated(&problem), Effort::Thorough);
     assert_eq!(found.at_bound, [4], "{:?}", found.values);
 }

@@ -407,6 +407,7 @@ fn a_diagnosis_shows_all_its_evidence() {
         "<b>|velocity| &lt; 0.21 rad",
         "71 % of the squared error in 17 % of the rows",
         "moved the position by 0.0812 rad",
+        "acted where <b>|velocity| &lt; 0.05 rad",
         "where what was found acted",
         "these recordings cannot tell",
     ] {

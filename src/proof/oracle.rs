@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::trial::{Fitted, finite};
 use crate::robot::{Commands, Joint};
-use crate::sim2real::diagnose::{Calibration, calibrate};
+use crate::sim2real::diagnose::{Calibration, Comparison, Outcome, calibrate, diagnose};
 use crate::sim2real::{Assembly, Candidate, Recording, Seed, Simulator, Thetas, Twin};
 
 /// What the oracle found.
@@ -22,21 +22,61 @@ pub struct OracleFit {
 const STARTS: usize = 48;
 const FOLLOWED: usize = 2;
 /// Fits at the most.
-const FITS: usize = 6;
+const FITS: usize = 4;
 
-/// Fits `twin` with exactly the mechanisms `names`, each in its best form, from several starts; what fits the recording to
-/// learn from best is kept. None where the registry lacks a name; with no names the twin is recalibrated.
+/// An answer of the oracle, before the best is chosen: its squared error on what was fitted, and what it is.
+type Attempt = (f64, OracleFit);
+
+/// Fits `twin` with exactly the mechanisms `names`, each in its best form; what fits the recording to learn from best is
+/// kept. None where the registry lacks a name; with no names the twin is recalibrated.
+///
+/// It has three ways to go about it: what the diagnosis found, where it named just these; a diagnosis that knows no other
+/// names; and where that does not come to all of them, fits from the mechanisms' own starts.
 pub(super) fn oracle(
     twin: &Assembly<Joint>,
     train: &[Recording<Commands>],
     test: &[Recording<Commands>],
     names: &[&str],
+    diagnosed: &Outcome<Assembly<Joint>>,
 ) -> Option<OracleFit> {
-    let run = |twin: &Assembly<Joint>| calibrate(twin, train, test, Seed(0), &|_, _, _| {});
-    let bare = run(twin);
+    let bare = calibrate(twin, train, test, Seed(0), &|_, _, _| {});
     if names.is_empty() {
         return Some(OracleFit { held_out: held_out(&bare), parameters: Vec::new() });
     }
+    let known: Vec<String> = twin.registry().iter().map(|row| row.about().name.to_owned()).collect();
+    if !names.iter().all(|name| known.iter().any(|known| known == name)) {
+        return None;
+    }
+    let others: Vec<String> = known.into_iter().filter(|known| !names.contains(&known.as_str())).collect();
+    let told = diagnose(&twin.clone().excluding(&others), train, test, Seed(0), &|_, _, _| {});
+    let mut attempts: Vec<Attempt> = [diagnosed, &told].into_iter().filter_map(|outcome| as_found(outcome, names)).collect();
+    if as_found(&told, names).is_none() {
+        attempts.extend(as_fitted(twin, train, test, names, &bare));
+    }
+    attempts.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, fit)| fit)
+}
+
+/// What a diagnosis found, where it named all of `names` and no other.
+fn as_found(outcome: &Outcome<Assembly<Joint>>, names: &[&str]) -> Option<Attempt> {
+    let effects = &outcome.diagnosis.effects;
+    let parameters = names.iter().map(|name| {
+        let effect = effects.iter().find(|effect| effect.mechanism == *name)?;
+        Some(effect.parameters.iter().map(|(name, estimate)| (name.clone(), Fitted::from(estimate))).collect())
+    });
+    let parameters: Vec<BTreeMap<String, Fitted>> = parameters.collect::<Option<_>>()?;
+    let held_out = finite(outcome.diagnosis.fit.first()?.trued_rmse);
+    let exact = effects.len() == names.len();
+    exact.then(|| (learnt(&outcome.comparisons, |c| &c.trued), OracleFit { held_out, parameters }))
+}
+
+/// Fits from the starts that come nearest before anything is fitted.
+fn as_fitted(
+    twin: &Assembly<Joint>,
+    train: &[Recording<Commands>],
+    test: &[Recording<Commands>],
+    names: &[&str],
+    bare: &Calibration,
+) -> Vec<Attempt> {
     let mut starts: Vec<Start> = Vec::new();
     for choice in choices(&twin.candidates(train), names) {
         let with = choice.iter().fold(twin.clone(), |twin, candidate| twin.with(candidate));
@@ -45,20 +85,21 @@ pub(super) fn oracle(
         starts.extend(tried.into_iter().take(FOLLOWED).map(|(error, values)| (error, with.clone(), choice.clone(), values)));
     }
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let own = twin.parameters().len();
-    let fits = starts.into_iter().take(FITS).map(|(_, with, choice, values)| {
-        let nominal: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).chain(values).collect();
-        (run(&with.with_values(&nominal)), choice)
-    });
-    let (best, choice) = fits.min_by(|a, b| learnt(&a.0).total_cmp(&learnt(&b.0)))?;
-    let mut at = own;
-    let parameters = choice.iter().map(|candidate| {
-        let from = at;
-        at += candidate.form.parameters.len();
-        let fitted = |k: usize| Fitted { value: finite(best.values[k]), std: Some(best.std[k]).filter(|s| s.is_finite()) };
-        candidate.form.parameters.iter().enumerate().map(|(k, p)| (p.name.clone().into_owned(), fitted(from + k))).collect()
-    });
-    Some(OracleFit { parameters: parameters.collect(), held_out: held_out(&best) })
+    let fit = |(_, with, choice, values): Start| {
+        let point: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).chain(values).collect();
+        let fit = calibrate(&with.with_values(&point), train, test, Seed(0), &|_, _, _| {});
+        let mut at = twin.parameters().len();
+        let parameters = choice.iter().map(|candidate| {
+            let from = at;
+            at += candidate.form.parameters.len();
+            let fitted = |k: usize| Fitted { value: finite(fit.values[k]), std: Some(fit.std[k]).filter(|s| s.is_finite()) };
+            let named = candidate.form.parameters.iter().enumerate();
+            named.map(|(k, parameter)| (parameter.name.clone().into_owned(), fitted(from + k))).collect()
+        });
+        let parameters = parameters.collect();
+        (learnt(&fit.comparisons, |c| &c.recalibrated), OracleFit { held_out: held_out(&fit), parameters })
+    };
+    starts.into_iter().take(FITS).map(fit).collect()
 }
 
 /// Error at a start, the twin, its mechanisms and the values of their parameters there.
@@ -104,10 +145,10 @@ fn held_out(calibration: &Calibration) -> f64 {
 }
 
 /// Squared error on what was fitted.
-fn learnt(calibration: &Calibration) -> f64 {
-    let fitted = calibration.comparisons.iter().filter(|comparison| !comparison.held_out);
+fn learnt(comparisons: &[Comparison], of: impl Fn(&Comparison) -> &Vec<f64>) -> f64 {
+    let fitted = comparisons.iter().filter(|comparison| !comparison.held_out);
     let squares = fitted.flat_map(|comparison| {
-        let pairs = comparison.measured.iter().zip(&comparison.recalibrated);
+        let pairs = comparison.measured.iter().zip(of(comparison));
         pairs.filter_map(|(measured, simulated)| Some(((*measured)? - simulated).powi(2)))
     });
     finite(squares.sum())

@@ -170,6 +170,7 @@ pub(super) mod tests {
             confidence: *confidence,
             rivals: Vec::new(),
             parameters: BTreeMap::new(),
+            active: Vec::new(),
         });
         let outside = kind == Kind::Outside;
         Entry {

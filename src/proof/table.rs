@@ -141,7 +141,12 @@ fn further(entries: &[Entry]) -> [Figure; 5] {
 fn located(entries: &[Entry]) -> [Figure; 2] {
     let effects: Vec<(&Entry, &Concealed)> = entries.iter().filter(|e| clear(e)).map(|e| (e, &e.label.effects[0])).collect();
     let overlaps = effects.iter().filter(|(_, effect)| !effect.active.is_empty());
-    let overlaps = overlaps.map(|(entry, effect)| overlap(&effect.active, &entry.trial.intervals));
+    // When a mechanism acted, where it was named, else where the error lies.
+    let said = |entry: &Entry, id: &str| {
+        let named = entry.trial.found.iter().find(|found| found.mechanism == id && !found.active.is_empty());
+        named.map_or_else(|| entry.trial.intervals.clone(), |found| found.active.clone())
+    };
+    let overlaps = overlaps.map(|(entry, effect)| overlap(&effect.active, &said(entry, &effect.id)));
     let times = effects.iter().filter_map(|(entry, effect)| {
         let said = event_time(&entry.trial, &effect.id);
         Some(said.map_or(f64::INFINITY, |said| (said - effect.onset.unwrap_or(said)).abs()))
@@ -189,11 +194,12 @@ fn overlap(one: &[Span], other: &[Span]) -> f64 {
 struct Pair {
     fitted: Fitted,
     truth: f64,
+    scale: f64,
 }
 
 impl Pair {
     fn error(&self) -> f64 {
-        ((self.fitted.value - self.truth) / self.truth).abs()
+        (self.fitted.value - self.truth).abs() / self.scale
     }
 
     fn covered(&self) -> bool {
@@ -235,8 +241,15 @@ fn parameters(entries: &[Entry]) -> [Figure; 2] {
 
 /// The parameters of an effect that can be compared: those that the form found has in common with the truth.
 fn pairs(effect: &Concealed, fitted: impl Fn(&str) -> Option<Fitted>) -> Vec<Pair> {
+    let truth = |name: &str| effect.parameters.get(name).copied().unwrap_or(0.0);
+    // One of the two parts of a wave may be next to nothing: both are measured by the whole.
+    let amplitude = truth("sine").hypot(truth("cosine"));
     let comparable = effect.parameters.iter().filter(|(name, truth)| name.as_str() != "time" && **truth != 0.0);
-    comparable.filter_map(|(name, truth)| Some(Pair { fitted: fitted(name)?, truth: *truth })).collect()
+    let pair = |(name, truth): (&String, &f64)| {
+        let scale = if ["sine", "cosine"].contains(&name.as_str()) { amplitude } else { truth.abs() };
+        Some(Pair { fitted: fitted(name)?, truth: *truth, scale })
+    };
+    comparable.filter_map(pair).collect()
 }
 
 /// Held-out errors over the oracle's, of cases with one or two effects.

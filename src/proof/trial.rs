@@ -43,6 +43,9 @@ pub struct Found {
     pub rivals: Vec<String>,
     /// Its parameters.
     pub parameters: BTreeMap<String, Fitted>,
+    /// When it acted, in the recording to learn from; empty where it acted throughout.
+    #[serde(default)]
+    pub active: Vec<Span>,
 }
 
 /// A fitted value and its standard deviation, which is none where it is infinite.
@@ -71,23 +74,27 @@ pub fn tried(case: &Case, clock: &(dyn Fn() -> f64 + Sync)) -> Trial {
     let twin = twin(case);
     let [train, test] = recordings(case).map(|recording| [recording]);
     let began = clock();
-    let diagnosis = diagnose(&twin, &train, &test, Seed(0), &|_, _, _| {}).diagnosis;
+    let outcome = diagnose(&twin, &train, &test, Seed(0), &|_, _, _| {});
     let seconds = clock() - began;
     let names: Vec<&str> = case.label.effects.iter().map(|effect| effect.id.as_str()).collect();
+    let oracle = oracle(&twin, &train, &test, &names, &outcome);
+    let diagnosis = outcome.diagnosis;
     Trial {
         verdict: diagnosis.verdict,
         onset: diagnosis.location.onset,
         intervals: intervals(&diagnosis, &train[0].name),
         held_out: held_out(&diagnosis),
-        oracle: oracle(&twin, &train, &test, &names),
+        oracle,
         regression: regression(case),
-        found: diagnosis.effects.into_iter().map(found).collect(),
+        found: diagnosis.effects.into_iter().map(|effect| found(effect, &train[0].name)).collect(),
         seconds,
     }
 }
 
-fn found(effect: Effect) -> Found {
+fn found(effect: Effect, recording: &str) -> Found {
+    let active = effect.active.iter().filter(|stretch| stretch.recording == recording);
     Found {
+        active: active.map(|stretch| Span { start: stretch.start, end: stretch.end }).collect(),
         mechanism: effect.mechanism,
         confidence: effect.confidence,
         rivals: effect.rivals.into_iter().map(|rival| rival.mechanism).collect(),

@@ -221,7 +221,7 @@ impl Lane {
                 let mut force = self.force(state, command, push) + self.reaction(state);
                 if push.creeping_friction > 0.0 {
                     let stopping = CREEP_SHARE * (inertia * CREEP_RATE * velocity + force);
-                    force -= stopping.clamp(-push.creeping_friction, push.creeping_friction);
+                    force -= stopping.max(-push.creeping_friction).min(push.creeping_friction);
                 }
                 (force + friction) / inertia
             }

@@ -251,7 +251,7 @@ impl Dynamics<Joint> for JointDynamics {
                 let driven = |velocity: f64| torque - viscous * velocity;
                 let stopping = |velocity: f64| {
                     let whole = CREEP_SHARE * (inertia * CREEP_RATE * velocity + driven(velocity));
-                    whole.clamp(-effect.creeping_friction, effect.creeping_friction)
+                    whole.max(-effect.creeping_friction).min(effect.creeping_friction)
                 };
                 // As of the middle of the step: creep is fast for a step.
                 let change = (driven(state.velocity) - stopping(state.velocity)) / inertia;

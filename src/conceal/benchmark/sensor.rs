@@ -110,9 +110,7 @@ impl Sensor {
             Effect::Creep { size, settling: None } => q + size * (time / 20.0).sqrt(),
             Effect::Stretch { excess, reach } => q + excess * q * (1.0 + 0.03 * (q / reach).powi(2).min(9.0)),
             Effect::Fold { share, rounding } => (1.0 - share) * q + share * q.hypot(rounding),
-            Effect::Wobble { size, phase, harmonic } => {
-                q + size * ((q + phase).sin() - phase.sin() + harmonic * (2.0 * q).sin())
-            }
+            Effect::Wobble { size, phase, harmonic } => q + size * ((q + phase).sin() + harmonic * (2.0 * q).sin()),
             _ => q,
         })
     }

@@ -45,11 +45,8 @@ fn a_case_is_the_same_wherever_and_whenever_it_is_drawn() {
 fn twins_are_off_by_as_much_as_they_say_they_may_be() {
     for case in cases(2, 0..5) {
         let (truth, label) = (case.label.arm.values(), &case.label);
-        for k in 0..3 {
-            assert!(
-                (case.nominal[k] / truth[k] - 1.0).abs() < 0.31 || truth[k] == 0.0 && case.nominal[k] == 0.0,
-                "{label:?}"
-            );
+        for (nominal, truth) in case.nominal.iter().zip(&truth).take(3) {
+            assert!((nominal / truth - 1.0).abs() < 0.31 || *truth == 0.0 && *nominal == 0.0, "{label:?}");
         }
         assert_eq!((case.nominal[3], case.uncertainty[3]), (truth[3], 0.0));
         let rows = case.train.rows();

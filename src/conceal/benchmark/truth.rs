@@ -75,7 +75,8 @@ pub(super) fn parameters(id: &str, effect: &Effect, scales: &Scales, met: &Met) 
             vec![("compliance", 1.0 / stiffness), ("motor_share", motor_share)]
         }
         (_, Effect::Coupling { gap, motor_share, .. }) => vec![("gap", gap), ("motor_share", motor_share)],
-        (_, Effect::Yielding { torque, .. }) => vec![("torque", torque)],
+        // The last of its elements hardly yields: what the torque would come to is never seen.
+        (_, Effect::Yielding { .. }) => Vec::new(),
         (_, Effect::Poles { first, second }) => vec![("time_constant", first + second), ("total_time", first + second)],
         (_, Effect::Band { width }) => {
             let given = |u: f64| u - width * (u / width).tanh();
@@ -91,6 +92,8 @@ pub(super) fn parameters(id: &str, effect: &Effect, scales: &Scales, met: &Met) 
         }
         (_, Effect::Slew { rate }) => vec![("rate", rate)],
         (_, Effect::Bus { delay, .. }) => vec![("seconds", delay)],
+        // Where nothing pulls an arm to a place, nobody knows at what angle its sensor sits.
+        (_, Effect::Wobble { .. }) if scales.arm.adds_up() => Vec::new(),
         _ => of_sensor(effect),
     };
     named.into_iter().filter(|(_, value)| value.is_finite()).map(|(name, value)| (name.to_owned(), value)).collect()

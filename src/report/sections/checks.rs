@@ -49,7 +49,6 @@ impl Section for Checks<'_> {
                 rows => rows,
                 notes => checks.notes.clone(),
                 held_out => &self.diagnosis.held_out,
-                next => self.diagnosis.next_experiment.as_ref().map(|n| n.what.as_str()),
             },
         )
     }

@@ -53,7 +53,7 @@ fn commands(excitation: &Excitation) -> Value {
         y_label: "command".into(),
         scale: Scale::Number,
         curves: vec![Curve {
-            ink: Ink::Recalibrated,
+            ink: Ink::Equity,
             mark: Mark::Step,
             x: &excitation.time,
             y: excitation.command.iter().map(|v| Some(*v)).collect(),

@@ -15,8 +15,8 @@ pub(in crate::report) struct Place<'a> {
 
 /// Stretches of time in the table; plots shade them all.
 const STRETCHES: usize = 4;
-/// Profiles drawn: three a row.
-const PROFILES: usize = 6;
+/// Channels whose errors are drawn over states.
+const CHANNELS: usize = 2;
 
 impl Section for Place<'_> {
     fn id(&self) -> &'static str {
@@ -30,7 +30,13 @@ impl Section for Place<'_> {
     fn render(&self) -> Result<String, ReportError> {
         let location = &self.diagnosis.location;
         let acted: Vec<Value> = self.diagnosis.effects.iter().filter_map(acted).collect();
-        let profiles: Vec<Value> = self.figures.profiles.iter().take(PROFILES).enumerate().map(profile).collect();
+        let mut channels: Vec<&Profile> = Vec::new();
+        for profile in &self.figures.profiles {
+            if channels.len() < CHANNELS && !channels.iter().any(|known| known.channel == profile.channel) {
+                channels.push(profile);
+            }
+        }
+        let profiles: Vec<Value> = channels.iter().map(|first| self.profiles(first)).collect();
         let nothing = acted.is_empty() && location.intervals.is_empty() && location.against.is_empty();
         if nothing && location.onset.is_none() && profiles.is_empty() {
             return Ok(String::new());
@@ -71,14 +77,25 @@ impl Section for Place<'_> {
     }
 }
 
+impl Place<'_> {
+    /// The profiles of the channel that `first` is of.
+    fn profiles(&self, first: &Profile) -> Value {
+        let own = self.figures.profiles.iter().enumerate().filter(|(_, p)| p.channel == first.channel);
+        let plots: Vec<Value> = own.map(profile).collect();
+        context! { channel => axis(&first.channel, &first.unit), plots => plots }
+    }
+}
+
 /// When a mechanism acted and by how much it moved the output; none where neither is known.
 fn acted(effect: &Effect) -> Option<Value> {
     let moved: Vec<Value> =
         effect.moved.iter().map(|m| context! { channel => &m.channel, rms => with_unit(&number(m.rms), &m.unit) }).collect();
     let known = effect.location.is_some() || !moved.is_empty();
+    // `position > 0.5 rad` is a condition, `throughout` a time.
+    let condition = effect.location.as_ref().is_some_and(|l| l.contains(['<', '>']));
     let stretches = effect.active.len();
     known.then(|| {
-        context! { name => &effect.mechanism, place => effect.location.as_deref(), moved => moved, stretches => stretches }
+        context! { name => &effect.mechanism, place => effect.location.as_deref(), moved => moved, stretches => stretches, condition => condition }
     })
 }
 
@@ -88,7 +105,8 @@ fn profile((k, profile): (usize, &Profile)) -> Value {
     let plot = Plot {
         alt: format!("Error of {} over {}: recalibrated, trued and the noise floor", profile.channel, profile.on),
         x_label: axis(&profile.on, &profile.on_unit),
-        y_label: axis(&format!("error of {}", profile.channel), &profile.unit),
+        // The caption says what the errors are of: beside three plots there is no room.
+        y_label: String::new(),
         scale: Scale::Number,
         curves: vec![
             line(Ink::Measured, &noise),

@@ -6,9 +6,11 @@ use std::fmt;
 
 /// A name that expressions have for something.
 type Named<T> = (&'static str, T);
+type OfOne = fn(f64) -> f64;
+type OfTwo = fn(f64, f64) -> f64;
 
 /// A function of one number.
-pub(super) const FUNCTIONS: [Named<fn(f64) -> f64>; 17] = [
+pub(super) const FUNCTIONS: [Named<OfOne>; 17] = [
     ("sin", f64::sin),
     ("cos", f64::cos),
     ("tan", f64::tan),
@@ -29,7 +31,7 @@ pub(super) const FUNCTIONS: [Named<fn(f64) -> f64>; 17] = [
 ];
 
 /// A function of two numbers.
-pub(super) const FUNCTIONS_OF_TWO: [Named<fn(f64, f64) -> f64>; 4] =
+pub(super) const FUNCTIONS_OF_TWO: [Named<OfTwo>; 4] =
     [("min", f64::min), ("max", f64::max), ("atan2", f64::atan2), ("hypot", f64::hypot)];
 
 /// Names that stand for a number.

@@ -158,7 +158,7 @@ impl Work {
                 acting.inertia[i] * *acceleration + push.effort - push.stiffness * position - push.damping * velocity;
             if push.creeping_friction > 0.0 {
                 let stopping = CREEP_SHARE * (inertia * CREEP_RATE * velocity + effort);
-                effort -= stopping.clamp(-push.creeping_friction, push.creeping_friction);
+                effort -= stopping.max(-push.creeping_friction).min(push.creeping_friction);
             }
             *acceleration = (effort + friction) / inertia;
         }

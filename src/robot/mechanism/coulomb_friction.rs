@@ -86,7 +86,7 @@ impl<P: Mover> Law<P> for Smooth {
             // Along the tangent the friction is that of the middle of the step, to second order; along the line to the
             // origin no step can overshoot rest. So the one in fast motion and the other in slow.
             let within = tick.step * friction.abs();
-            let fast = (velocity.abs() * P::inertia(scene.dynamics, lane, state) - within).clamp(0.0, within);
+            let fast = (velocity.abs() * P::inertia(scene.dynamics, lane, state) - within).max(0.0).min(within);
             let slope = if fast < within {
                 let chord = if velocity == 0.0 { tangent } else { friction / velocity };
                 chord + (tangent - chord) * fast / within

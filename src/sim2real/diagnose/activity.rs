@@ -16,12 +16,17 @@ use crate::sim2real::{Clock, Part, Thetas, Trajectory, Twin};
 const TOGETHER: usize = 4;
 /// A mechanism acts where it moves the output by this part of what it does where it acts most.
 const ACTS: f64 = 0.1;
+/// Some laws do nothing at all at times: where a mechanism rests, to within this part, in so many of the windows, it acts
+/// wherever it does anything to speak of.
+const RESTS: f64 = 1e-6;
+const RESTING: f64 = 0.05;
+const ANYTHING: f64 = 0.01;
 /// Acting in this part of the rows is acting throughout.
 const THROUGHOUT: f64 = 0.9;
 /// Pauses of at most this many windows are none.
 const PAUSE: usize = 2;
 /// Balanced accuracy with which a covariate must tell acting from not acting, to be named.
-const SEPARATES: f64 = 0.85;
+const SEPARATES: f64 = 0.9;
 /// Time is named where nothing else does better by more than this: what happened once will look like some state.
 const SIMPLER: f64 = 0.03;
 /// Where nothing separates the moments, acting in less than this part of the rows is acting at times; in more, on and off
@@ -228,7 +233,9 @@ fn told<T: Twin>(inquiry: &Inquiry<'_, T>, deeds: &[Deed], covariates: &Covariat
 fn acts(deeds: &[Deed]) -> Vec<bool> {
     let (fourth, second) = deeds.iter().fold((0.0, 0.0), |(f, s), d| (f + d.size.powi(4), s + d.size.powi(2)));
     let most = if second > 0.0 { (fourth / second).sqrt() } else { 0.0 };
-    deeds.iter().map(|d| most > 0.0 && d.size > ACTS * most).collect()
+    let resting = deeds.iter().filter(|d| d.size <= RESTS * most).count();
+    let level = if resting as f64 > RESTING * deeds.len() as f64 { ANYTHING } else { ACTS };
+    deeds.iter().map(|d| most > 0.0 && d.size > level * most).collect()
 }
 
 /// Neighbouring windows in which it acted, as stretches of time; short pauses are none.
@@ -330,8 +337,11 @@ mod tests {
     #[test]
     fn little_is_not_acting() {
         let deed = |size| Deed { part: 0, rows: (0, 4), size };
-        let deeds: Vec<Deed> = [0.0, 0.01, 1.0, 0.8, 0.05, 0.3].into_iter().map(deed).collect();
+        let deeds: Vec<Deed> = [1e-3, 0.01, 1.0, 0.8, 0.05, 0.3].into_iter().map(deed).collect();
         assert_eq!(acts(&deeds), [false, false, true, true, false, true]);
+        // What rests altogether at times acts wherever it does something.
+        let limited: Vec<Deed> = [0.0, 0.0, 1.0, 0.8, 0.05, 0.3].into_iter().map(deed).collect();
+        assert_eq!(acts(&limited), [false, false, true, true, true, true]);
         assert_eq!(acts(&[deed(0.0)]), [false]);
     }
 }

@@ -46,21 +46,20 @@ pub(super) fn next<T: Twin>(
     let own: Vec<&str> = effects.iter().map(|e| e.mechanism.as_str()).collect();
     let all: Vec<&str> = others.iter().map(|(name, _)| name.as_str()).collect();
     let Some(best) = Design::of(inquiry, &selection.selected, &others).and_then(|design| design.best()) else {
-        let what =
-            format!("record with other amplitudes and frequencies, so that {} no longer look alike", pair(&own, &all));
+        let what = format!("record with other amplitudes and frequencies, so that {} can be told", apart(&own, &all));
         return Some((advice(what, &own, &all), None));
     };
     let told = |tells: bool| -> Vec<&str> {
         all.iter().zip(&best.gains).filter(|(_, gain)| (**gain >= TELLS) == tells).map(|(name, _)| *name).collect()
     };
-    let (apart, alike) = (told(true), told(false));
+    let (told_apart, alike) = (told(true), told(false));
     let least = |gains: &[f64]| -> f64 {
         gains.iter().zip(&best.gains).filter(|(_, g)| **g >= TELLS).map(|(g, _)| *g).fold(f64::INFINITY, f64::min)
     };
-    if apart.is_empty() {
+    if told_apart.is_empty() {
         let what = format!(
-            "no command within one and a half times the range used tells {} apart: measure another channel, or with less noise",
-            pair(&own, &all)
+            "no command within one and a half times the range used tells {}: measure another channel, or with less noise",
+            apart(&own, &all)
         );
         return Some((advice(what, &own, &all), None));
     }
@@ -69,19 +68,19 @@ pub(super) fn next<T: Twin>(
     let time = &best.excitation.time;
     let seconds = time.last().copied().unwrap_or(0.0) + time.get(1).copied().unwrap_or(0.0);
     let mut what = format!(
-        "send {EXPERIMENT_FILE}, {} s of {}, and record as before: {} would then differ by {} noise standard deviations even \
-         after refitting, which is worth {} in log-likelihood (the commands at hand: {})",
+        "send {EXPERIMENT_FILE}, {} s of {}, and record as before: that tells {}, by {} noise standard deviations even after \
+         refitting, which is worth {} in log-likelihood (the commands at hand: {})",
         figure(seconds, 2),
         best.excitation.name,
-        pair(&own, &apart),
+        apart(&own, &told_apart),
         figure(separation, 2),
         figure(gain, 2),
         figure(so_far, 2)
     );
     if !alike.is_empty() {
-        what += &format!("; {} will look alike whatever is sent", pair(&own, &alike));
+        what += &format!("; nothing that can be sent tells {}", apart(&own, &alike));
     }
-    let rivals = own.iter().chain(&apart).filter(|n| !n.is_empty()).map(|n| (*n).to_owned()).collect();
+    let rivals = own.iter().chain(&told_apart).filter(|n| !n.is_empty()).map(|n| (*n).to_owned()).collect();
     let next = NextExperiment {
         what,
         file: Some(EXPERIMENT_FILE.to_owned()),
@@ -93,15 +92,16 @@ pub(super) fn next<T: Twin>(
     Some((next, Some(best.excitation)))
 }
 
-/// What is to be told apart: what was found and its rivals, none of which is the twin without what was found.
-fn pair(own: &[&str], others: &[&str]) -> String {
-    let named: Vec<&str> = own.iter().chain(others).copied().filter(|name| !name.is_empty()).collect();
-    match named.as_slice() {
+/// What is to be told from what: what was found, and its rivals or the twin without it.
+fn apart(own: &[&str], others: &[&str]) -> String {
+    let listed = |names: &[&str], joint: &str| match names {
         [] => "the hypotheses left".to_owned(),
-        all if others.iter().all(|name| name.is_empty()) => format!("the twin with {} and without", all.join(", ")),
-        [one] => (*one).to_owned(),
-        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
-    }
+        [rest @ .., last] if !rest.is_empty() => format!("{} {joint} {last}", rest.join(", ")),
+        all => all.concat(),
+    };
+    let named: Vec<&str> = others.iter().copied().filter(|name| !name.is_empty()).collect();
+    let from = if named.is_empty() { "nothing".to_owned() } else { listed(&named, "and from") };
+    format!("{} from {from}", listed(own, "and"))
 }
 
 /// Words alone: where commands are no numbers, or none within reach tells.

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::hypothesis::Inquiry;
-use super::select::{Selection, gain, lead};
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::select::{SHARE, Selection, gain, lead, share};
 use crate::sim2real::identify::Effort;
 use crate::sim2real::{About, Twin};
 
@@ -68,11 +68,12 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
                 .par_iter()
                 .map(|s| (s.number, inquiry.extended(less, s.number, s, Effort::Brief)))
                 .map(|(other, briefly)| match lead(inquiry, selected, &briefly) {
-                    loss if loss < HOPELESS => (other, lead(inquiry, selected, &inquiry.refitted(&briefly))),
-                    loss => (other, loss),
+                    loss if loss < HOPELESS => (other, inquiry.refitted(&briefly)),
+                    _ => (other, briefly),
                 })
-                .map(|(other, loss)| {
-                    (other, loss - handicap(inquiry.candidates[*own].about, inquiry.candidates[other].about))
+                .map(|(other, rival)| {
+                    let abouts = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
+                    (other, loss(inquiry, &selection.recalibrated, selected, &rival, abouts))
                 })
                 .collect();
             Place { gain: whole, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
@@ -80,16 +81,27 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
         .collect()
 }
 
-/// What a law that contains another must be better by to stand in its place: one more constant fits anything a little
-/// better.
-fn handicap(own: About, other: About) -> f64 {
+/// By how much the rival loses; negative where it is to be preferred.
+///
+/// A law that contains another must be better by more than others, for one more constant fits anything a little better;
+/// and must explain a share of the first misfit more, for laws never have quite the form of the real thing.
+fn loss<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    selected: &Hypothesis<T>,
+    rival: &Hypothesis<T>,
+    (own, other): (About, About),
+) -> f64 {
+    let loss = lead(inquiry, selected, rival);
     if own.contains.contains(&other.name) {
-        WITHIN
-    } else if other.contains.contains(&own.name) {
-        -WITHIN
-    } else {
-        0.0
+        let slight = share(first, rival, selected) < SHARE;
+        return if slight { -1.0 } else { loss - WITHIN };
     }
+    if other.contains.contains(&own.name) {
+        let slight = share(first, selected, rival) < SHARE;
+        return if slight { loss.max(0.5 * WITHIN) } else { loss + WITHIN };
+    }
+    loss
 }
 
 /// Probabilities of the selected mechanism and of each rival, from what they lose: the gain is twice the logarithm of a

@@ -13,7 +13,7 @@ use crate::sim2real::{Candidate, Twin};
 pub(super) const ACCEPT: f64 = 10.0;
 /// A further mechanism must explain at least this part of the first misfit, for laws never have quite the form of the
 /// real thing, and what they leave looks like something else ...
-const SHARE: f64 = 0.03;
+pub(super) const SHARE: f64 = 0.03;
 /// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
 const COMPLETES: f64 = 0.8;
 /// A mechanism must move at least this many rows by more than the noise.
@@ -85,7 +85,7 @@ pub(super) fn select<T: Twin>(
         let far = FAR_BEHIND * gain(inquiry, &beam[0], &best).max(0.0);
         beam = children.into_iter().take(BEAM).filter(|child| lead(inquiry, &best, child) <= far.max(ACCEPT)).collect();
     }
-    let (selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
+    let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
     Selection { recalibrated, selected, without, scores }
 }
 
@@ -124,7 +124,7 @@ impl<T: Twin> Selection<T> {
     pub fn refitted(&self, inquiry: &Inquiry<'_, T>) -> Self {
         let recalibrated = inquiry.refitted(&self.recalibrated);
         let whole = if self.selected.added.is_empty() { Vec::new() } else { vec![inquiry.refitted(&self.selected)] };
-        let (selected, without) = pruned(inquiry, &recalibrated, whole);
+        let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, whole);
         Self { recalibrated, selected, without, scores: self.scores.clone() }
     }
 
@@ -132,14 +132,16 @@ impl<T: Twin> Selection<T> {
     pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
         let less = &self.without[place];
         let screened = inquiry.screened(less).into_iter().find(|s| s.number == other)?;
-        let (selected, without) =
+        let (recalibrated, selected, without) =
             pruned(inquiry, &self.recalibrated, vec![inquiry.extended(less, other, &screened, Effort::Thorough)]);
-        (lead(inquiry, &selected, &self.selected) > 0.0).then(|| Self {
-            recalibrated: self.recalibrated.clone(),
-            selected,
-            without,
-            scores: self.scores.clone(),
-        })
+        // A simpler law is preferred although it explains a little less.
+        let simpler = self.selected.added.get(place).is_some_and(|own| {
+            let (own, other) = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
+            own.contains.contains(&other.name)
+        });
+        let kept = selected.added.len() >= self.selected.added.len();
+        let better = lead(inquiry, &selected, &self.selected) > 0.0;
+        (better || simpler && kept).then(|| Self { recalibrated, selected, without, scores: self.scores.clone() })
     }
 }
 
@@ -300,26 +302,33 @@ fn above_noise(misfit: &ChannelMisfit) -> f64 {
     (misfit.sum_of_squares - misfit.count as f64).max(0.1 * misfit.sum_of_squares)
 }
 
-/// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time.
+/// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time. Gives the twin with
+/// nothing added too: its refit may have been better begun from where that of the set ended.
 fn pruned<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     recalibrated: &Hypothesis<T>,
     mut best_of_stage: Vec<Hypothesis<T>>,
-) -> (Hypothesis<T>, Vec<Hypothesis<T>>) {
-    let Some(mut whole) = best_of_stage.pop() else { return (recalibrated.clone(), Vec::new()) };
+) -> (Hypothesis<T>, Hypothesis<T>, Vec<Hypothesis<T>>) {
+    let mut bare = recalibrated.clone();
+    let Some(mut whole) = best_of_stage.pop() else { return (bare.clone(), bare, Vec::new()) };
     loop {
         if whole.added.is_empty() {
-            return (recalibrated.clone(), Vec::new());
+            return (bare.clone(), bare, Vec::new());
         }
-        let without: Vec<Hypothesis<T>> = (0..whole.added.len())
-            .into_par_iter()
-            .map(|i| if whole.added.len() == 1 { recalibrated.clone() } else { inquiry.without(&whole, i) })
-            .collect();
+        let mut without: Vec<Hypothesis<T>> =
+            (0..whole.added.len()).into_par_iter().map(|i| inquiry.without(&whole, i)).collect();
+        if let [alone] = without.as_mut_slice() {
+            if squares(alone) < squares(&bare) {
+                bare = alone.clone();
+            } else {
+                *alone = bare.clone();
+            }
+        }
         let weakest = (0..whole.added.len())
-            .map(|i| (i, gain(inquiry, &without[i], &whole), needed(inquiry, recalibrated, &without[i], &whole)))
+            .map(|i| (i, gain(inquiry, &without[i], &whole), needed(inquiry, &bare, &without[i], &whole)))
             .filter(|(_, gain, needed)| *gain <= ACCEPT || !needed)
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((weakest, _, _)) = weakest else { return (whole, without) };
+        let Some((weakest, _, _)) = weakest else { return (bare, whole, without) };
         let smaller = without[weakest].clone();
         // Another set of that size, found on the way up, may have been the better one to keep.
         whole = match best_of_stage.pop() {
@@ -327,6 +336,19 @@ fn pruned<T: Twin>(
             _ => smaller,
         };
     }
+}
+
+/// Sum of squared residuals of all channels.
+fn squares<T>(hypothesis: &Hypothesis<T>) -> f64 {
+    hypothesis.misfits.iter().map(|m| m.sum_of_squares).sum()
+}
+
+/// By what part of the first misfit above the noise `better` explains more than `other`, in the channel where it is most.
+pub(super) fn share<T>(first: &Hypothesis<T>, other: &Hypothesis<T>, better: &Hypothesis<T>) -> f64 {
+    let channels = first.misfits.iter().zip(&other.misfits).zip(&better.misfits);
+    channels
+        .map(|((first, other), better)| (other.sum_of_squares - better.sum_of_squares) / above_noise(first).max(1e-300))
+        .fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Whether `whole` explains enough more than `less`, in enough rows.

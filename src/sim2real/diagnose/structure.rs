@@ -42,7 +42,7 @@ fn winsorize(residual: &[f64]) -> Vec<f64> {
     sizes.sort_by(f64::total_cmp);
     let limit =
         sizes.get(((sizes.len() as f64 * WINSOR) as usize).min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0);
-    residual.iter().map(|r| r.clamp(-limit, limit)).collect()
+    residual.iter().map(|r| r.max(-limit).min(limit)).collect()
 }
 
 /// -log10 of the p-value that the mean of `values` is the same in all quantile groups of `by`.

@@ -157,7 +157,7 @@ impl<S: Simulator> Problem<'_, S> {
                     let residual = self.residual(part, run);
                     // The priors' rows of the basis meet zeros: only its measured rows count.
                     let known = basis[number].rows(0, residual.len());
-                    let explained = &known * known.tr_mul(&residual);
+                    let explained = known * known.tr_mul(&residual);
                     residual - explained
                 })
                 .collect()
