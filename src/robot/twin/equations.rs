@@ -11,8 +11,8 @@ use crate::robot::{
 use crate::sim2real::{Assembly, Parameter, Recording};
 
 /// Steps of integration between two rows, where the twin does not say how long a step is. An oscillation that is sampled
-/// ten times a period is then right to a part in 10^6 a period.
-const STEPS: f64 = 8.0;
+/// ten times a period is then right to a part in 10^5 a period.
+const STEPS: f64 = 4.0;
 /// Longest step [s] where mechanisms of motion act: friction that creeps relaxes within some 10 ms.
 const LONGEST_MOVING: f64 = 5e-3;
 
