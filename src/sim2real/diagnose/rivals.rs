@@ -67,7 +67,7 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
             let others: Vec<(usize, f64)> = screened
                 .par_iter()
                 .map(|s| (s.number, inquiry.extended(less, s.number, s, Effort::Brief)))
-                .map(|(other, briefly)| match lead(inquiry, selected, &briefly) {
+                .map(|(other, briefly)| match lead(inquiry, &selection.recalibrated, selected, &briefly) {
                     loss if loss < HOPELESS => (other, inquiry.refitted(&briefly)),
                     _ => (other, briefly),
                 })
@@ -92,7 +92,7 @@ fn loss<T: Twin>(
     rival: &Hypothesis<T>,
     (own, other): (About, About),
 ) -> f64 {
-    let loss = lead(inquiry, selected, rival);
+    let loss = lead(inquiry, first, selected, rival);
     if own.contains.contains(&other.name) {
         let slight = share(first, rival, selected) < SHARE;
         return if slight { -1.0 } else { loss - WITHIN };

@@ -83,7 +83,11 @@ pub(super) fn select<T: Twin>(
         // The best alone may be the wrong one to build on; what explains far less is not the right one either.
         let best = children[0].clone();
         let far = FAR_BEHIND * gain(inquiry, &beam[0], &best).max(0.0);
-        beam = children.into_iter().take(BEAM).filter(|child| lead(inquiry, &best, child) <= far.max(ACCEPT)).collect();
+        beam = children
+            .into_iter()
+            .take(BEAM)
+            .filter(|child| lead(inquiry, &recalibrated, &best, child) <= far.max(ACCEPT))
+            .collect();
     }
     let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
     Selection { recalibrated, selected, without, scores }
@@ -140,7 +144,7 @@ impl<T: Twin> Selection<T> {
             own.contains.contains(&other.name)
         });
         let kept = selected.added.len() >= self.selected.added.len();
-        let better = lead(inquiry, &selected, &self.selected) > 0.0;
+        let better = lead(inquiry, &recalibrated, &selected, &self.selected) > 0.0;
         (better || simpler && kept).then(|| Self { recalibrated, selected, without, scores: self.scores.clone() })
     }
 }
@@ -213,23 +217,31 @@ fn finished<T: Twin>(
         .collect()
 }
 
+/// Residuals that differ by less than this part say the same; their numbers of effective residuals differ by more.
+const ALIKE_LEFT: f64 = 0.05;
+
 /// Hypotheses by what the evidence says of them, best first.
 ///
-/// All are weighed with the number of effective residuals of the one that leaves least: each with its own, those that
-/// leave nearly the same would be ranked by the scatter of that number.
+/// Each is weighed with its own number of effective residuals, for the right one leaves whiter ones. But those that leave
+/// nearly as little as the one that leaves least are weighed with the number of that one: their own would rank them by its
+/// scatter.
 fn ranked<T: Twin>(inquiry: &Inquiry<'_, T>, reference: &Hypothesis<T>, all: Vec<Hypothesis<T>>) -> Vec<Hypothesis<T>> {
-    let left = |h: &Hypothesis<T>| h.misfits.iter().map(|m| m.count as f64 * m.sum_of_squares.max(1e-300).ln()).sum::<f64>();
-    let Some(best) = all.iter().min_by(|a, b| left(a).total_cmp(&left(b))).cloned() else { return all };
+    let Some(best) = all.iter().min_by(|a, b| squares(a).total_cmp(&squares(b))).cloned() else { return all };
     let mut keyed: Vec<(f64, Hypothesis<T>)> =
-        all.into_iter().map(|h| (weighed(inquiry, reference, &h, &best), h)).collect();
+        all.into_iter().map(|h| (weighed(inquiry, reference, &h, scale_of(&h, &best)), h)).collect();
     keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
     keyed.into_iter().map(|(_, h)| h).collect()
 }
 
-/// By how much the evidence prefers `a` to `b`, two alternatives of which neither need contain the other.
-pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
-    let left = |h: &Hypothesis<T>| h.misfits.iter().map(|m| m.count as f64 * m.sum_of_squares.max(1e-300).ln()).sum::<f64>();
-    weighed(inquiry, b, a, if left(a) <= left(b) { a } else { b })
+/// By whose number of effective residuals `one` is weighed beside `best`.
+fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypothesis<T> {
+    if squares(one) <= (1.0 + ALIKE_LEFT) * squares(best) { best } else { one }
+}
+
+/// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other.
+pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
+    let best = if squares(a) <= squares(b) { a } else { b };
+    weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best))
 }
 
 /// Which of the screened candidates, best first, are fitted: the best mechanisms in their best forms, further forms of the
@@ -332,7 +344,7 @@ fn pruned<T: Twin>(
         let smaller = without[weakest].clone();
         // Another set of that size, found on the way up, may have been the better one to keep.
         whole = match best_of_stage.pop() {
-            Some(other) if lead(inquiry, &other, &smaller) > 0.0 => other,
+            Some(other) if lead(inquiry, &bare, &other, &smaller) > 0.0 => other,
             _ => smaller,
         };
     }
