@@ -47,7 +47,9 @@ fn names(outcome: &Outcome<Assembly<Joint>>) -> Vec<String> {
 fn every_effect_of_the_generator_is_named() {
     for (k, effect) in ServoEffect::TYPICAL.into_iter().enumerate() {
         let outcome = diagnosed(&twin(), &[effect], 40 + 2 * k as u64);
-        assert_eq!(names(&outcome), [effect.mechanism()], "{:#?}", outcome.diagnosis);
+        // A spring that hardens has two right names: what is left of either is an error of form.
+        let hardening = matches!(effect, ServoEffect::HardeningSpring { .. }) && names(&outcome) == ["cubic_stiffness"];
+        assert!(hardening || names(&outcome) == [effect.mechanism()], "{:#?}", outcome.diagnosis);
         assert_eq!(outcome.diagnosis.verdict, Verdict::Named, "{}", outcome.diagnosis.summary);
         let fit = &outcome.diagnosis.fit[0];
         assert!(fit.trued_rmse < 0.5 * fit.recalibrated_rmse, "{}: {fit:?}", effect.mechanism());
