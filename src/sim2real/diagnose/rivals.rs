@@ -83,8 +83,9 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
 
 /// By how much the rival loses; negative where it is to be preferred.
 ///
-/// A law that contains another must be better by more than others, for one more constant fits anything a little better;
-/// and must explain a share of the first misfit more, for laws never have quite the form of the real thing.
+/// A law with more constants must explain a share of the first misfit more, for laws never have quite the form of the real
+/// thing, and one more constant bends anything a little nearer; one that contains another must besides be better by more
+/// than others.
 fn loss<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     first: &Hypothesis<T>,
@@ -93,13 +94,15 @@ fn loss<T: Twin>(
     (own, other): (About, About),
 ) -> f64 {
     let loss = lead(inquiry, first, selected, rival);
-    if own.contains.contains(&other.name) {
+    let contained = own.contains.contains(&other.name);
+    let containing = other.contains.contains(&own.name);
+    if contained || rival.free() < selected.free() {
         let slight = share(first, rival, selected) < SHARE;
-        return if slight { -1.0 } else { loss - WITHIN };
+        return if slight { loss.min(-1.0) } else { loss - if contained { WITHIN } else { 0.0 } };
     }
-    if other.contains.contains(&own.name) {
+    if containing || rival.free() > selected.free() {
         let slight = share(first, selected, rival) < SHARE;
-        return if slight { loss.max(0.5 * WITHIN) } else { loss + WITHIN };
+        return if slight { loss.max(0.5 * WITHIN) } else { loss + if containing { WITHIN } else { 0.0 } };
     }
     loss
 }

@@ -139,10 +139,11 @@ impl<T: Twin> Selection<T> {
         let (recalibrated, selected, without) =
             pruned(inquiry, &self.recalibrated, vec![inquiry.extended(less, other, &screened, Effort::Thorough)]);
         // A simpler law is preferred although it explains a little less.
-        let simpler = self.selected.added.get(place).is_some_and(|own| {
-            let (own, other) = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
-            own.contains.contains(&other.name)
-        });
+        let simpler = selected.free() < self.selected.free()
+            || self.selected.added.get(place).is_some_and(|own| {
+                let (own, other) = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
+                own.contains.contains(&other.name)
+            });
         let kept = selected.added.len() >= self.selected.added.len();
         let better = lead(inquiry, &recalibrated, &selected, &self.selected) > 0.0;
         (better || simpler && kept).then(|| Self { recalibrated, selected, without, scores: self.scores.clone() })
