@@ -24,7 +24,7 @@ pub(super) fn finished<T: Twin>(
         let squares = |h: &Hypothesis<T>| h.misfits.iter().map(|m| m.sum_of_squares).sum::<f64>();
         let gained = gain(inquiry, &selection.selected, &rounded);
         if gained > ACCEPT && squares(&rounded) < LEFT * squares(&selection.selected) {
-            places.push(Place { gain: gained, others: Vec::new() });
+            places.push(Place { gain: gained, nearest: None, others: Vec::new() });
             selection.without = selection.without.iter().map(|less| inquiry.as_it_is(less, number)).collect();
             selection.without.push(selection.selected.clone());
             selection.selected = rounded;
@@ -40,11 +40,7 @@ pub(super) fn signs<T: Simulator>(twin: &T, recordings: &[Recording<T::Stimulus>
     let Some(channel) = twin.channels().first() else { return Signs::default() };
     for recording in recordings {
         let Some(measured) = recording.channel(&channel.name) else { continue };
-        // A sensor that counts in steps repeats itself whenever the signal is slow.
-        if twin.resolution(recording, &channel.name) > 0.0 {
-            continue;
-        }
-        let stale = stale(measured);
+        let stale = stale(measured, twin.resolution(recording, &channel.name));
         samples += stale.len();
         repeated += stale.iter().filter(|s| **s).count();
         runs += stale.iter().zip(std::iter::once(&false).chain(&stale)).filter(|(now, before)| **now && !**before).count();
@@ -56,18 +52,60 @@ pub(super) fn signs<T: Simulator>(twin: &T, recordings: &[Recording<T::Stimulus>
     Signs { repeated: repeated as f64 / samples as f64, run: repeated as f64 / runs.max(1) as f64 }
 }
 
-/// Which samples repeat the one before.
-fn stale(measured: &Measured) -> Vec<bool> {
+/// A run of equal samples counts as lost where fewer than this many as long are to be expected by chance ...
+const BY_CHANCE: f64 = 0.1;
+/// ... and where the signal then leaps by this many of the sensor's steps, as one does that went on unseen.
+const LEAP: f64 = 2.5;
+
+/// Which samples repeat the one before though nothing stood still; `resolution` is the standard deviation of the sensor's
+/// rounding, 0 where it does not round.
+fn stale(measured: &Measured, resolution: f64) -> Vec<bool> {
+    let samples = &measured.samples;
+    let present = || samples.iter().flatten().copied();
+    // A sensor at the end of its range repeats itself with reason.
+    let ends = [present().fold(f64::INFINITY, f64::min), present().fold(f64::NEG_INFINITY, f64::max)];
     let repeats = |w: &[Option<f64>]| w[1].is_some() && w[0].map(f64::to_bits) == w[1].map(f64::to_bits);
-    std::iter::once(false).chain(measured.samples.windows(2).map(repeats)).collect()
+    let mut stale: Vec<bool> = std::iter::once(false).chain(samples.windows(2).map(repeats)).collect();
+    let step = resolution * 12.0_f64.sqrt();
+    let longest = if step > 0.0 { longest_by_chance(&stale) } else { 0 };
+    let mut from = 0;
+    while from < stale.len() {
+        let count = stale[from..].iter().take_while(|s| **s).count();
+        if count > 0 {
+            let held = samples[from].unwrap_or(f64::NAN);
+            let after = samples.get(from + count).copied().flatten();
+            let leaps = step == 0.0 || after.is_some_and(|v| (v - held).abs() > LEAP * step);
+            if ends.contains(&held) || count <= longest || !leaps {
+                stale[from..from + count].fill(false);
+            }
+        }
+        from += count.max(1);
+    }
+    stale
+}
+
+/// The longest run of repeats that a sensor which counts in steps shows by chance: as often as it repeats itself once, it
+/// does so again.
+fn longest_by_chance(repeats: &[bool]) -> usize {
+    let began = repeats.windows(2).filter(|w| !w[0]).count().max(1);
+    let once = repeats.windows(2).filter(|w| !w[0] && w[1]).count();
+    let often = once as f64 / began as f64;
+    if often <= 0.0 { 0 } else { ((BY_CHANCE / repeats.len() as f64).ln() / often.min(0.99).ln()).ceil() as usize }
 }
 
 /// The recordings with repeated samples marked as lost.
-pub(super) fn without_repeats<S: Clone>(recordings: &[Recording<S>], channel: &str) -> Vec<Recording<S>> {
+pub(super) fn without_repeats<T: Simulator>(
+    twin: &T,
+    recordings: &[Recording<T::Stimulus>],
+    channel: &str,
+) -> Vec<Recording<T::Stimulus>> {
     let mut cleaned = recordings.to_vec();
-    for measured in cleaned.iter_mut().flat_map(|r| &mut r.measured).filter(|m| m.channel == channel) {
-        let lost = stale(measured);
-        measured.samples.iter_mut().zip(lost).filter(|(_, lost)| *lost).for_each(|(sample, _)| *sample = None);
+    for (recording, cleaned) in recordings.iter().zip(&mut cleaned) {
+        let resolution = twin.resolution(recording, channel);
+        for measured in cleaned.measured.iter_mut().filter(|m| m.channel == channel) {
+            let lost = stale(measured, resolution);
+            measured.samples.iter_mut().zip(lost).filter(|(_, lost)| *lost).for_each(|(sample, _)| *sample = None);
+        }
     }
     cleaned
 }
@@ -85,13 +123,28 @@ pub(super) fn fixed(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
 mod tests {
     use super::*;
 
+    fn measured(samples: Vec<Option<f64>>) -> Measured {
+        Measured { channel: "y".into(), unit: String::new(), samples }
+    }
+
     #[test]
-    fn a_sample_that_repeats_the_one_before_is_lost() {
-        let samples = vec![Some(0.1), Some(0.1), None, None, Some(0.2), Some(0.3), Some(0.3), Some(0.3)];
-        let measured = Measured { channel: "y".into(), unit: String::new(), samples };
-        assert_eq!(stale(&measured), [false, true, false, false, false, false, true, true]);
-        let recording = Recording { name: String::new(), time: vec![0.0; 8], stimulus: (), measured: vec![measured] };
-        let cleaned = without_repeats(&[recording], "y");
-        assert_eq!(cleaned[0].measured[0].samples.iter().flatten().count(), 3);
+    fn a_sample_that_repeats_the_one_before_is_lost_but_at_the_end_of_the_range() {
+        let samples = [0.2, 0.2, 0.1, 0.3, 0.3, 0.3, 0.5, 0.5].map(Some).to_vec();
+        assert_eq!(stale(&measured(samples), 0.0), [false, true, false, false, true, true, false, false]);
+    }
+
+    #[test]
+    fn a_sensor_that_counts_repeats_itself_by_chance_and_loses_samples_all_the_same() {
+        let counted = |i: usize| (100.0 * (0.02 * i as f64).sin() + 0.4 * (i as f64 * 1.7).sin()).round();
+        let whole: Vec<Option<f64>> = (0..2_000).map(|i| Some(counted(i))).collect();
+        let resolution = 1.0 / 12.0_f64.sqrt();
+        assert!(stale(&measured(whole.clone()), resolution).iter().all(|s| !s), "nothing was lost");
+        let mut held = whole;
+        for from in (20..1_900).step_by(157) {
+            let last = held[from];
+            held[from + 1..from + 31].fill(last);
+        }
+        let lost = stale(&measured(held), resolution).iter().filter(|s| **s).count();
+        assert!((300..=360).contains(&lost), "{lost} of 360");
     }
 }
