@@ -333,6 +333,18 @@ const CASES: &[Case] = &[
         law: |_, x, u| motor_and_link(x, u, 0.4, 0.1, touch(x, 0.03, 0.4)),
         most: 5e-4,
     },
+    Case {
+        mechanism: "backlash",
+        form: "gap_spring",
+        values: &[0.03, 0.4, 60.0, 0.2],
+        law: |_, x, u| {
+            let damping = 0.4 * (60.0 * 0.24 * INERTIA).sqrt();
+            let (apart, rate) = (x[2] - x[0], x[3] - x[1]);
+            let pushes = |depth, rate| pushed(depth, rate, 60.0, damping);
+            motor_and_link(x, u, 0.4, 0.0, pushes(apart - 0.015, rate) - pushes(-0.015 - apart, -rate))
+        },
+        most: 5e-4,
+    },
 ];
 
 fn loaded(t: f64, x: State, u: f64, time: f64, inertia: f64, gravity: f64) -> Forces {

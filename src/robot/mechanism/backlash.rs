@@ -10,7 +10,8 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site,
 ///
 /// In the form `gap`, a motor with `motor_share` of the inertia, driven by the command and damped by the joint's viscous
 /// friction, moves the link only where it touches it, at either end of `gap`; in the form `gap_friction` the motor has dry
-/// friction of its own as well. The touch is stiff: 160 Hz for motor and link against each other, and critically damped.
+/// friction of its own as well. The touch is stiff: 160 Hz for motor and link against each other, and critically damped. In
+/// the form `gap_spring` it gives: by `stiffness`, with a damper of `damping_ratio` times the critical damping of the two.
 ///
 /// Source: Tao & Kokotović, *Adaptive Control of Systems with Actuator and Sensor Nonlinearities* (1996), chapter 2 (play);
 /// Nordin & Gutman, "Controlling mechanical systems with backlash: a survey", Automatica 38 (2002), section 2 (gap).
@@ -46,11 +47,16 @@ where
         let share = || Parameter::new("motor_share", "", 0.5).within(0.05, 0.95).starting_at(&[0.3, 0.8]);
         let friction =
             Parameter::new("motor_friction", "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&[0.1 * typical.effort]);
+        // What bends by a part of the smallest gap under the usual effort, and by as much as the middle one.
+        let firm = [300.0, 30.0].map(|factor| factor * typical.effort / typical.output.max(1e-12));
+        let stiffness = Parameter::new("stiffness", "N m/rad", firm[0]).within(0.0, f64::INFINITY).starting_at(&firm);
+        let ratio = Parameter::new("damping_ratio", "", 0.3).within(0.0, 5.0).starting_at(&[0.3]);
         let width = Parameter::new("width", "command", 0.0).within(0.0, f64::INFINITY).starting_at(&widths);
         vec![
             Form { name: "play", parameters: vec![width] },
             Form { name: "gap", parameters: vec![gap(), share()] },
             Form { name: "gap_friction", parameters: vec![gap(), share(), friction] },
+            Form { name: "gap_spring", parameters: vec![gap(), share(), stiffness, ratio] },
         ]
     }
 
@@ -69,7 +75,8 @@ where
             return Box::new(Play { width: row, follower: vec![None; thetas.lanes()] });
         }
         let friction = if form == 2 { thetas.row(2).to_vec() } else { vec![0.0; thetas.lanes()] };
-        Box::new(Gap { gap: row, share: thetas.row(1).to_vec(), friction, motor: vec![None; thetas.lanes()] })
+        let spring = (form == 3).then(|| (thetas.row(2).to_vec(), thetas.row(3).to_vec()));
+        Box::new(Gap { gap: row, share: thetas.row(1).to_vec(), friction, spring, motor: vec![None; thetas.lanes()] })
     }
 }
 
@@ -98,6 +105,8 @@ struct Gap {
     gap: Vec<f64>,
     share: Vec<f64>,
     friction: Vec<f64>,
+    /// Stiffness and damping ratio of the touch, where it gives.
+    spring: Option<(Vec<f64>, Vec<f64>)>,
     motor: Vec<Option<SecondMass>>,
 }
 
@@ -113,11 +122,12 @@ impl<P: Mover> Law<P> for Gap {
             let inertia = P::inertia(scene.dynamics, lane, state);
             let drive = P::drive(scene.dynamics, lane, state, &scene.commands[lane]);
             let damping = P::damping(scene.dynamics, lane, state);
-            let wall = Wall {
-                stiffness: TOUCH * TOUCH * share * (1.0 - share) * inertia,
-                damping_ratio: TOUCH_DAMPING,
-                inertia: share * (1.0 - share) * inertia,
+            let reduced = share * (1.0 - share) * inertia;
+            let (stiffness, damping_ratio) = match &self.spring {
+                Some((stiffness, ratio)) => (stiffness[lane].max(1e-9), ratio[lane]),
+                None => (TOUCH * TOUCH * reduced, TOUCH_DAMPING),
             };
+            let wall = Wall { stiffness, damping_ratio, inertia: reduced };
             let motor = match motor {
                 Some(motor) => {
                     motor.arrive(link.velocity);
@@ -202,7 +212,7 @@ mod tests {
     /// What is shared in contacts is shared by the masses: no momentum is lost or made.
     #[test]
     fn momentum_is_that_of_the_drive() {
-        let mut law = Gap { gap: vec![0.03], share: vec![0.4], friction: vec![0.0], motor: vec![None] };
+        let mut law = Gap { gap: vec![0.03], share: vec![0.4], friction: vec![0.0], spring: None, motor: vec![None] };
         let (inertia, step) = (0.1, 1e-3);
         let joint = Joint::new(crate::robot::Axis::Rotary, TRIAL.parameters, [0.0; 4]);
         let dynamics = crate::sim2real::Plant::dynamics(&joint, &Thetas::single(&TRIAL.parameters));
