@@ -500,7 +500,7 @@ impl<P: Plant> Twin for Assembly<P> {
             if modelled.contains(&about.name) || self.excluded.iter().any(|id| id == about.name) {
                 continue;
             }
-            for (form_index, form) in mechanism.forms(&typical).into_iter().enumerate() {
+            for (form_index, form) in mechanism.sought(&typical).into_iter().enumerate() {
                 let known = recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus));
                 if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
                     let finishing = mechanism.finishing(form_index);

@@ -127,6 +127,10 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn about(&self) -> About;
     /// Its forms, the plainest first, with starts that suit what is `typical` of the recording.
     fn forms(&self, typical: &Typical) -> Vec<Form>;
+    /// The forms as a diagnosis seeks them: with bounds as narrow as what is `typical` of the recordings lets a law be told by.
+    fn sought(&self, typical: &Typical) -> Vec<Form> {
+        self.forms(typical)
+    }
     /// Whether a form could act at all on the given plant and what drives it: a fraction of a quoted spread needs
     /// quotes.
     fn applies(&self, _form: usize, _plant: &P, _stimulus: &P::Stimulus) -> bool {

@@ -4,6 +4,9 @@ use super::spring::Wall;
 use crate::robot::{Mover, Push};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
+/// Part of the range of a motion that may lie beyond a stop.
+const REACH: f64 = 0.35;
+
 /// Beyond `upper`, `-(stiffness (q - upper) + damping v)`, never pulling back; likewise below `lower`; or both. The damping
 /// is `2 damping_ratio sqrt(stiffness inertia)`.
 ///
@@ -45,6 +48,21 @@ impl<P: Mover> Mechanism<P> for EndStop {
             Form { name: "lower", parameters: vec![lower(&one), stiffness(), ratio()] },
             Form { name: "both", parameters: vec![lower(&two), upper(&two), stiffness(), ratio()] },
         ]
+    }
+
+    /// A stop is free over most of the way: one that is leaned on throughout is a load and a spring.
+    fn sought(&self, typical: &Typical) -> Vec<Form> {
+        let [lowest, highest] = typical.range;
+        let reach = REACH * (highest - lowest);
+        let mut forms = Mechanism::<P>::forms(self, typical);
+        for parameter in forms.iter_mut().flat_map(|form| &mut form.parameters) {
+            match parameter.name.as_ref() {
+                "upper" => parameter.lower = highest - reach,
+                "lower" => parameter.upper = lowest + reach,
+                _ => {}
+            }
+        }
+        forms
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
