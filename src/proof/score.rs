@@ -168,6 +168,8 @@ pub(super) mod tests {
         let found = said.iter().map(|(mechanism, confidence)| Found {
             mechanism: (*mechanism).to_owned(),
             confidence: *confidence,
+            gain: None,
+            margin: None,
             rivals: Vec::new(),
             parameters: BTreeMap::new(),
             active: Vec::new(),
@@ -189,6 +191,7 @@ pub(super) mod tests {
             },
             trial: Trial {
                 verdict,
+                remainder: 0.0,
                 found: found.collect(),
                 onset: None,
                 intervals: Vec::new(),

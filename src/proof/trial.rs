@@ -18,6 +18,9 @@ pub struct Trial {
     pub verdict: Verdict,
     /// What was named, most certain first.
     pub found: Vec<Found>,
+    /// The part of the recalibrated misfit that is left.
+    #[serde(default)]
+    pub remainder: f64,
     /// When it began [s], if the diagnosis says so.
     pub onset: Option<f64>,
     /// Where, in the recording to learn from.
@@ -39,6 +42,12 @@ pub struct Found {
     pub mechanism: String,
     /// Probability that the name is right.
     pub confidence: f64,
+    /// Evidence that would be lost without it.
+    #[serde(default)]
+    pub gain: Option<f64>,
+    /// Evidence by which the nearest rival falls behind.
+    #[serde(default)]
+    pub margin: Option<f64>,
     /// What else it might be.
     pub rivals: Vec<String>,
     /// Its parameters.
@@ -81,6 +90,7 @@ pub fn tried(case: &Case, clock: &(dyn Fn() -> f64 + Sync)) -> Trial {
     let diagnosis = outcome.diagnosis;
     Trial {
         verdict: diagnosis.verdict,
+        remainder: finite(diagnosis.checks.remainder),
         onset: diagnosis.location.onset,
         intervals: intervals(&diagnosis, &train[0].name),
         held_out: held_out(&diagnosis),
@@ -97,6 +107,8 @@ fn found(effect: Effect, recording: &str) -> Found {
         active: active.map(|stretch| Span { start: stretch.start, end: stretch.end }).collect(),
         mechanism: effect.mechanism,
         confidence: effect.confidence,
+        gain: effect.gain.filter(|gain| gain.is_finite()),
+        margin: effect.margin.filter(|margin| margin.is_finite()),
         rivals: effect.rivals.into_iter().map(|rival| rival.mechanism).collect(),
         parameters: effect.parameters.into_iter().map(|(name, estimate)| (name, Fitted::from(&estimate))).collect(),
     }

@@ -77,6 +77,13 @@ pub struct Effect {
     pub site: Site,
     /// Probability that the name is right, from 0 to 1.
     pub confidence: f64,
+    /// Evidence that would be lost without it: `N_e ln(RSS0 / RSS1) - dk ln N_e`, about twice the logarithm of a likelihood
+    /// ratio. None for what is seen without a fit.
+    #[serde(default)]
+    pub gain: Option<f64>,
+    /// Evidence by which the nearest of all rivals that were tried falls behind; none where there was none to try.
+    #[serde(default)]
+    pub margin: Option<f64>,
     /// Its fitted parameters.
     pub parameters: BTreeMap<String, Estimate>,
     /// What else it might be.

@@ -31,6 +31,11 @@ impl<T> Hypothesis<T> {
     pub(super) fn free(&self) -> usize {
         self.fit.free.len()
     }
+
+    /// Whether the mean square of what is left is at most `times` that of the noise, whatever its colour.
+    pub(super) fn within(&self, times: f64) -> bool {
+        self.misfits.iter().all(|m| m.within(times, m.level))
+    }
 }
 
 /// What all hypotheses share: the twin as given, what may be added to it, and the evidence.

@@ -3,7 +3,7 @@
 //! One file a step, in this order: `evidence` divides the recordings and finds their `noise`; a `hypothesis` is the
 //! twin with mechanisms added, and the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
 //! by their signatures; `select` fits and compares sets of them, by the evidence that `whiteness` counts; `rivals`
-//! looks for other names; `structure` asks what is left; `prove` measures errors on what was held out; `verdict` weighs it
+//! looks for other names; `remainder` asks what is left, and `structure` what it depends on; `prove` measures errors on what was held out; `verdict` weighs it
 //! all, and `words` tells it. `locate` and `onset` say where and since when the twin is off, `activity` when what was named
 //! acted, and `experiment` designs, from the commands of `excitation`, what to record where rivals are left.
 
@@ -20,6 +20,7 @@ mod onset;
 mod profile;
 mod prove;
 mod recognize;
+mod remainder;
 mod rivals;
 mod screen;
 mod select;
@@ -45,7 +46,7 @@ use rivals::Place;
 use select::Selection;
 
 use super::identify::Fit;
-use super::{Clock, Recording, Seed, Twin};
+use super::{ChannelWeight, Clock, Recording, Seed, Twin};
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
@@ -128,7 +129,7 @@ pub fn diagnose<T: Twin>(
         return followed(&quiet, recordings, held_out, &found, seed, progress);
     }
     let channel = twin.channels().first().map(|c| c.name.clone()).unwrap_or_default();
-    let cleaned = [recordings, held_out].map(|all| recognize::without_repeats(all, &channel));
+    let cleaned = [recordings, held_out].map(|all| recognize::without_repeats(twin, all, &channel));
     followed(&quiet, &cleaned[0], &cleaned[1], &found, seed, progress)
 }
 
@@ -171,11 +172,11 @@ fn followed<T: Twin>(
     };
     let comparisons = prove::compared(&contest, inquiry.evidence, seed);
     let findings = verdict::Findings {
-        fits: prove::channel_fits(&comparisons, &inquiry.evidence.weights, seed),
+        fits: prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed),
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
-        remainder: verdict::remainder(&inquiry, &selection),
-        dependence: verdict::dependence(&inquiry, &selection.selected),
-        foretold: verdict::foretold(&inquiry, &selection.selected),
+        remainder: remainder::remainder(&inquiry, &selection),
+        dependence: remainder::dependence(&inquiry, &selection.selected),
+        foretold: remainder::foretold(&inquiry, &selection.selected),
         std: inflated(&inquiry, &selection.selected, &trued),
         trued: trued.clone(),
     };
@@ -247,10 +248,17 @@ pub fn calibrate<T: Twin>(
         std: inflated(&inquiry, &hypothesis, &fit),
         at_bound: fit.at_bound.iter().map(|k| twin.parameters()[*k].name.clone().into_owned()).collect(),
         values: fit.values,
-        fit: prove::channel_fits(&comparisons, &evidence.weights, seed),
+        fit: prove::channel_fits(&comparisons, &noise_of(&inquiry, &hypothesis), seed),
         held_out: evidence.how.clone(),
         comparisons,
     }
+}
+
+/// The noise of every channel, of the colour that the residuals of `hypothesis` have.
+fn noise_of<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> Vec<ChannelWeight> {
+    let level = |channel: &str| hypothesis.misfits.iter().find(|m| m.channel == channel).map_or(1.0, |m| m.level);
+    let weights = inquiry.evidence.weights.iter();
+    weights.map(|w| ChannelWeight { channel: w.channel.clone(), noise: w.noise * level(&w.channel).sqrt() }).collect()
 }
 
 /// Standard deviations as the residuals make them, rather than white noise of the noise floor's size: misfit and

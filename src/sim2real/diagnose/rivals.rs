@@ -3,22 +3,27 @@
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::screen::Screened;
 use super::select::{SHARE, Selection, gain, lead, share};
 use crate::sim2real::identify::Effort;
-use crate::sim2real::{About, Twin};
+use crate::sim2real::{About, Candidate, Twin};
 
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
 /// A rival that loses by more than this after a few steps is not followed further.
 const HOPELESS: f64 = 300.0;
-/// Other mechanisms fitted in the place of one.
-const TRIED: usize = 4;
+/// Other mechanisms fitted in the place of one: those that screening likes best without it, ...
+const BY_SCREEN: usize = 3;
+/// ... and those that stood best when they were tried beside fewer.
+const BY_GAIN: usize = 3;
 
 /// The rivals of one selected mechanism.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Place {
     /// What is lost by leaving the mechanism out.
     pub gain: f64,
+    /// By how much the nearest of all that were tried in its place loses; none where there was none to try.
+    pub nearest: Option<f64>,
     /// Other mechanisms in its place: number of the candidate, and by how much it loses (negative: wins).
     pub others: Vec<(usize, f64)>,
 }
@@ -54,16 +59,7 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
         .map(|(own, less)| {
             let name = inquiry.candidates[*own].about.name;
             let whole = gain(inquiry, less, selected);
-            let mut screened = inquiry.screened(less);
-            screened.retain(|s| s.score > 0.0 && inquiry.candidates[s.number].about.name != name);
-            screened.sort_by(|a, b| b.score.total_cmp(&a.score));
-            let mut tried: Vec<&str> = Vec::new();
-            screened.retain(|s| {
-                let other = inquiry.candidates[s.number].about.name;
-                let new = tried.len() < TRIED && !tried.contains(&other);
-                tried.extend(new.then_some(other));
-                new
-            });
+            let screened = likely(inquiry, selection, less, name);
             let others: Vec<(usize, f64)> = screened
                 .par_iter()
                 .map(|s| (s.number, inquiry.extended(less, s.number, s, Effort::Brief)))
@@ -76,9 +72,35 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
                     (other, loss(inquiry, &selection.recalibrated, selected, &rival, abouts))
                 })
                 .collect();
-            Place { gain: whole, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
+            let nearest = others.iter().map(|(_, loss)| *loss).min_by(f64::total_cmp);
+            Place { gain: whole, nearest, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
         })
         .collect()
+}
+
+/// The mechanisms that may be rivals of `own` beside what `less` has, each in its best form.
+fn likely<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, less: &Hypothesis<T>, own: &str) -> Vec<Screened> {
+    let name = |one: &Screened| inquiry.candidates[one.number].about.name;
+    let gained = |one: &Screened| {
+        let Candidate { about, form, .. } = &inquiry.candidates[one.number];
+        let tried = selection.scores.iter().filter(|s| s.mechanism == about.name && s.form == form.name);
+        tried.filter_map(|s| s.gain).filter(|gain| *gain > 0.0).fold(0.0, f64::max)
+    };
+    let mut screened = inquiry.screened(less);
+    screened.retain(|one| one.excited && name(one) != own);
+    let mut kept: Vec<Screened> = Vec::new();
+    let mut keep = |screened: &mut Vec<Screened>, key: &dyn Fn(&Screened) -> f64, most: usize| {
+        screened.sort_by(|a, b| key(b).total_cmp(&key(a)));
+        let before = kept.len();
+        for one in screened.iter().filter(|one| key(one) > 0.0) {
+            if kept.len() - before < most && !kept.iter().any(|other| name(other) == name(one)) {
+                kept.push(one.clone());
+            }
+        }
+    };
+    keep(&mut screened, &gained, BY_GAIN);
+    keep(&mut screened, &|one| one.score, BY_SCREEN);
+    kept
 }
 
 /// By how much the rival loses; negative where it is to be preferred.
@@ -122,9 +144,9 @@ mod tests {
 
     #[test]
     fn equal_rivals_share_and_distant_ones_do_not_count() {
-        let (own, others) = confidences(&Place { gain: 100.0, others: vec![(1, 0.0)] });
+        let (own, others) = confidences(&Place { gain: 100.0, nearest: None, others: vec![(1, 0.0)] });
         assert!((own - 0.5).abs() < 1e-9 && (others[0] - 0.5).abs() < 1e-9);
-        let (own, _) = confidences(&Place { gain: 100.0, others: vec![(1, 9.0)] });
+        let (own, _) = confidences(&Place { gain: 100.0, nearest: None, others: vec![(1, 9.0)] });
         assert!(own > 0.98);
     }
 }

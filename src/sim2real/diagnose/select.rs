@@ -18,6 +18,8 @@ pub(super) const SHARE: f64 = 0.03;
 const COMPLETES: f64 = 0.8;
 /// A mechanism must move at least this many rows by more than the noise.
 const INFORMATIVE_ROWS: usize = 25;
+/// A twin that leaves a mean squared residual of at most this many times the noise is not bent by what it lacks.
+const HARDLY_ABOVE: f64 = 1.05;
 /// Most mechanisms in a set.
 const STAGES: usize = 4;
 /// Where a first mechanism alone gains nothing, two may: they are tried while the mean squared residual is this many
@@ -31,14 +33,8 @@ const FITTED: usize = 6;
 const FINISHED: usize = 5;
 /// A hypothesis behind the best by more than this part of what that gains is not built on.
 const FAR_BEHIND: f64 = 0.5;
-/// Further forms fitted of each of the two most promising mechanisms.
-const FURTHER_FORMS: usize = 2;
-/// Of a mechanism that survives refitting by less than this part, what screening says is worth little: ...
-const HIDDEN: f64 = 0.15;
-/// ... unless it says it this loudly ...
-const LOUD: f64 = 0.5;
-/// ... so that many such are fitted whatever it says.
-const FITTED_HIDDEN: usize = 2;
+/// Mechanisms of which all forms are fitted: those that stood best in the form that screening liked best.
+const IN_ALL_FORMS: usize = 3;
 /// Signatures with a cosine above this look alike: such rivals are fitted too.
 const ALIKE: f64 = 0.9;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
@@ -74,7 +70,7 @@ pub(super) fn select<T: Twin>(
         scores.extend(tried);
         let Some(best) = children.first().cloned() else { break };
         let parent = best_of_stage.last().unwrap_or(&recalibrated);
-        let left = best.misfits.iter().any(|m| m.sum_of_squares > ABOVE_NOISE * m.count as f64);
+        let left = !best.within(ABOVE_NOISE);
         let promising = gain(inquiry, parent, &best) > ACCEPT || left && stage == 0;
         best_of_stage.push(best);
         if !promising {
@@ -96,7 +92,7 @@ pub(super) fn select<T: Twin>(
 impl<T: Twin> Selection<T> {
     /// Whether what was selected leaves hardly more than the noise.
     pub fn complete(&self) -> bool {
-        self.selected.misfits.iter().all(|m| m.sum_of_squares <= ABOVE_NOISE * m.count as f64)
+        self.selected.within(ABOVE_NOISE)
     }
 
     /// Notes what was added as it is, after everything else.
@@ -174,10 +170,18 @@ fn expand<T: Twin>(
             jobs.push((place, one, fitted));
         }
     }
-    let brief: Vec<Option<Hypothesis<T>>> = jobs
-        .par_iter()
-        .map(|(place, one, fitted)| fitted.then(|| inquiry.extended(&beam[*place], one.number, one, Effort::Brief)))
-        .collect();
+    let fit = |jobs: &[(usize, Screened, bool)], wanted: &[bool]| -> Vec<Option<Hypothesis<T>>> {
+        let one = |((place, one, _), wanted): (&(usize, Screened, bool), &bool)| {
+            wanted.then(|| inquiry.extended(&beam[*place], one.number, one, Effort::Brief))
+        };
+        jobs.par_iter().zip(wanted).map(one).collect()
+    };
+    let first_round: Vec<bool> = jobs.iter().map(|(_, _, fitted)| *fitted).collect();
+    let mut brief = fit(&jobs, &first_round);
+    let further = further_forms(inquiry, &beam[0], &jobs, &brief);
+    for (one, other) in brief.iter_mut().zip(fit(&jobs, &further)) {
+        *one = one.take().or(other);
+    }
     let fitted = finished(inquiry, &beam[0], brief);
     let scores = jobs
         .iter()
@@ -198,6 +202,28 @@ fn expand<T: Twin>(
         })
         .collect();
     (ranked(inquiry, &beam[0], fitted.into_iter().flatten().collect()), scores)
+}
+
+/// The forms not fitted yet of those mechanisms that stand best beside the best parent.
+fn further_forms<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    parent: &Hypothesis<T>,
+    jobs: &[(usize, Screened, bool)],
+    brief: &[Option<Hypothesis<T>>],
+) -> Vec<bool> {
+    let name = |number: usize| inquiry.candidates[number].about.name;
+    let own = jobs.iter().zip(brief).filter(|((place, _, _), _)| *place == 0);
+    let mut best: Vec<&str> = Vec::new();
+    for child in ranked(inquiry, parent, own.filter_map(|(_, child)| child.clone()).collect()) {
+        let added = child.added.last().map_or("", |number| name(*number));
+        if best.len() < IN_ALL_FORMS && !best.contains(&added) {
+            best.push(added);
+        }
+    }
+    let further = |(place, one, fitted): &(usize, Screened, bool)| {
+        *place == 0 && !fitted && one.excited && best.contains(&name(one.number))
+    };
+    jobs.iter().map(further).collect()
 }
 
 /// Fits to their end those of the briefly fitted hypotheses that may yet be the best.
@@ -245,8 +271,11 @@ pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: 
     weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best))
 }
 
-/// Which of the screened candidates, best first, are fitted: the best mechanisms in their best forms, further forms of the
-/// very best, and whatever looks much like the best.
+/// Which of the screened candidates, best first, are fitted, each mechanism in the form that screening likes best.
+///
+/// Beside a twin with nothing added it is all that the recordings could show: the refit of a twin that lacks something may
+/// be bent so far that the signature of what it lacks looks like nothing at all. Beside better twins it is the best, and
+/// whatever looks much like the best.
 fn chosen<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     first: &Hypothesis<T>,
@@ -263,38 +292,24 @@ fn chosen<T: Twin>(
         let explained = score * score;
         -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && BENEFIT_OF_DOUBT * explained > needed
     };
-    let name = |s: &Screened| inquiry.candidates[s.number].about.name;
-    let (most, further) = if place == 0 { (FITTED, FURTHER_FORMS) } else { (FITTED / 2, 0) };
+    let all = parent.added.is_empty() && !parent.within(HARDLY_ABOVE);
+    let most = if place == 0 { FITTED } else { FITTED / 2 };
     let mut mechanisms: Vec<&str> = Vec::new();
-    let mut forms: Vec<usize> = Vec::new();
-    let mut hidden = 0;
     screened
         .iter()
         .enumerate()
         .map(|(rank, one)| {
-            if place == 0 && one.excited && one.survival < HIDDEN && one.score < LOUD {
-                hidden += 1;
-                return hidden <= FITTED_HIDDEN;
-            }
-            if one.score <= 0.0 || !one.excited || !(rank < ALWAYS_FITTED || hopeful(one.score)) {
+            let name = inquiry.candidates[one.number].about.name;
+            let promising = all || one.score > 0.0 && (rank < ALWAYS_FITTED || hopeful(one.score));
+            if !one.excited || !promising || mechanisms.contains(&name) {
                 return false;
             }
-            match mechanisms.iter().position(|m| *m == name(one)) {
-                // Another form of a mechanism that is fitted already.
-                Some(known) => {
-                    forms[known] += 1;
-                    known < 2 && forms[known] <= further
-                }
-                None => {
-                    let alike = one.signature.dot(&screened[0].signature).abs() > ALIKE;
-                    let fitted = mechanisms.len() < most || alike && mechanisms.len() < 2 * most;
-                    if fitted {
-                        mechanisms.push(name(one));
-                        forms.push(0);
-                    }
-                    fitted
-                }
+            let alike = || one.signature.dot(&screened[0].signature).abs() > ALIKE;
+            let fitted = all || mechanisms.len() < most || alike() && mechanisms.len() < 2 * most;
+            if fitted {
+                mechanisms.push(name);
             }
+            fitted
         })
         .collect()
 }
@@ -305,14 +320,15 @@ fn needed_share<T>(first: &Hypothesis<T>, parent: &Hypothesis<T>) -> f64 {
         return 0.0;
     }
     let least = |(first, left): (&ChannelMisfit, &ChannelMisfit)| {
-        (SHARE * above_noise(first)).min(COMPLETES * above_noise(left)) / left.sum_of_squares.max(1e-300)
+        let most = (SHARE * above_noise(first, left.level)).min(COMPLETES * above_noise(left, left.level));
+        most / left.sum_of_squares.max(1e-300)
     };
     first.misfits.iter().zip(&parent.misfits).map(least).fold(f64::INFINITY, f64::min)
 }
 
-/// What a misfit has above the noise.
-fn above_noise(misfit: &ChannelMisfit) -> f64 {
-    (misfit.sum_of_squares - misfit.count as f64).max(0.1 * misfit.sum_of_squares)
+/// What a misfit has above noise of that level.
+fn above_noise(misfit: &ChannelMisfit, level: f64) -> f64 {
+    misfit.above(level).max(0.1 * misfit.sum_of_squares)
 }
 
 /// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time. Gives the twin with
@@ -360,7 +376,9 @@ fn squares<T>(hypothesis: &Hypothesis<T>) -> f64 {
 pub(super) fn share<T>(first: &Hypothesis<T>, other: &Hypothesis<T>, better: &Hypothesis<T>) -> f64 {
     let channels = first.misfits.iter().zip(&other.misfits).zip(&better.misfits);
     channels
-        .map(|((first, other), better)| (other.sum_of_squares - better.sum_of_squares) / above_noise(first).max(1e-300))
+        .map(|((first, other), better)| {
+            (other.sum_of_squares - better.sum_of_squares) / above_noise(first, better.level).max(1e-300)
+        })
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
@@ -369,7 +387,8 @@ fn needed<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, less: &Hypot
     let enough = whole.added.len() == 1
         || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), whole)| {
             let explained = less.sum_of_squares - whole.sum_of_squares;
-            explained >= SHARE * above_noise(first) || explained >= COMPLETES * above_noise(less)
+            let (all, left) = (above_noise(first, whole.level), above_noise(less, whole.level));
+            explained >= SHARE * all || explained >= COMPLETES * left
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let moved = (0..rows).filter(|i| (less.fit.residual[*i] - whole.fit.residual[*i]).abs() > 1.0).count();

@@ -6,12 +6,13 @@ use super::diagnosis::{
     ChannelFit, Checks, Diagnosis, Effect, Estimate, ParameterChange, Rival, SCHEMA, Score, Verdict, Where,
 };
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::remainder::AT_THE_NOISE;
 use super::rivals::{Place, confidences};
 use super::select::Selection;
-use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
+use super::structure::Dependence;
 use super::{Found, whiteness, words};
 use crate::sim2real::identify::Fit;
-use crate::sim2real::{Clock, Covariate, Part, Recording, Twin};
+use crate::sim2real::{Clock, Twin};
 
 /// A remainder above this part of the first misfit is more than an error of form.
 const FORM_ERROR: f64 = 0.10;
@@ -24,8 +25,8 @@ const FORETOLD_WELL: f64 = 0.25;
 /// A twin whose mean squared residual is this many times the noise does not explain the recordings, whether or not
 /// anything foretells what is left.
 const FAR_ABOVE_THE_NOISE: f64 = 9.0;
-/// A twin whose mean squared residual is at most this many times the noise needs nothing.
-const AT_THE_NOISE: f64 = 1.5;
+/// A twin to which nothing can be added and whose mean squared residual is this many times the noise lacks something unknown.
+const ABOVE_THE_NOISE: f64 = 2.0;
 /// What a regression foretells counts where the mean squared residual is more than this many times the noise.
 const HARDLY_ABOVE: f64 = 1.2;
 /// With fewer rows than this, what is not explained is not called explained either.
@@ -46,83 +47,6 @@ pub(super) struct Findings {
     pub foretold: f64,
     pub std: Vec<f64>,
     pub trued: Fit,
-}
-
-/// The part of the recalibrated misfit above the noise that is left: of the channel in which most is left.
-///
-/// Where rows are messages the misfit is taken about its mean: a constant cost is something that any simulator can be
-/// given, and no measure of what was explained.
-pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> f64 {
-    let blocks = inquiry.problem(inquiry.twin, &inquiry.evidence.compared).blocks();
-    let about_mean = inquiry.twin.clock() == Clock::Event;
-    selection
-        .recalibrated
-        .misfits
-        .iter()
-        .zip(&selection.selected.misfits)
-        .filter_map(|(first, last)| {
-            let count = first.count as f64;
-            let residual = selection.recalibrated.fit.residual.as_slice();
-            let sum: f64 = whiteness::of_channel(residual, &blocks, &first.channel).iter().flat_map(|s| s.iter()).sum();
-            let constant = if about_mean { sum * sum / count.max(1.0) } else { 0.0 };
-            let misfit = first.sum_of_squares - constant - count;
-            (misfit > (AT_THE_NOISE - 1.0) * count).then(|| ((last.sum_of_squares - count) / misfit).max(0.0))
-        })
-        .fold(0.0, f64::max)
-}
-
-/// What the remaining residuals of messages depend on most.
-pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
-    // Below the noise there is nothing to explain, however regular it is: rounding of the arithmetic is regular too.
-    if inquiry.twin.clock() != Clock::Event || within(selected, AT_THE_NOISE) {
-        return None;
-    }
-    let parts = &inquiry.evidence.compared;
-    let residual = selected.fit.residual.as_slice();
-    inquiry
-        .problem(&selected.twin, parts)
-        .blocks()
-        .iter()
-        .filter_map(|block| {
-            let covariates = inquiry.twin.covariates(parts[block.part].recording);
-            strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates)
-        })
-        .max_by(|a, b| a.strength.total_cmp(&b.strength))
-}
-
-/// The part of what is left of sampled signals that the motion foretells on held-out data.
-pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> f64 {
-    if inquiry.twin.clock() == Clock::Event {
-        return 0.0;
-    }
-    let held_out: Vec<Part<'_, T::Stimulus>> = match inquiry.evidence.window {
-        Some(seconds) => inquiry.evidence.held_out.iter().flat_map(|p| p.windows(seconds)).collect(),
-        None => inquiry.evidence.held_out.clone(),
-    };
-    let left = |parts: &[Part<'_, T::Stimulus>]| -> Vec<Left> {
-        let problem = inquiry.problem(&selected.twin, parts);
-        let residual = problem.evaluate(&selected.fit.values, &inquiry.evidence.initial_state(&problem), &[]).residual;
-        let blocks = problem.blocks();
-        let first = blocks.first().map(|b| b.channel.clone());
-        let of_first = blocks.into_iter().filter(|b| Some(&b.channel) == first.as_ref());
-        of_first
-            .map(|b| Left {
-                recording: identity(parts[b.part].recording),
-                residual: residual.as_slice()[b.range].to_vec(),
-                rows: b.rows,
-            })
-            .collect()
-    };
-    let mut covariates: BTreeMap<usize, Vec<Covariate>> = BTreeMap::new();
-    for part in inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out) {
-        covariates.entry(identity(part.recording)).or_insert_with(|| inquiry.twin.covariates(part.recording));
-    }
-    regression(&left(&inquiry.evidence.compared), &left(&held_out), &covariates)
-}
-
-/// What tells a recording from others: two may well have the same name.
-fn identity<S>(recording: &Recording<S>) -> usize {
-    std::ptr::from_ref(recording) as usize
 }
 
 /// The whole result.
@@ -189,6 +113,8 @@ pub(super) fn recognized<T: Twin>(diagnosis: &mut Diagnosis, inquiry: &Inquiry<'
             mechanism: candidate.about.name.to_owned(),
             site: candidate.about.site,
             confidence: CERTAIN_BY_SIGHT,
+            gain: None,
+            margin: None,
             parameters: candidate
                 .form
                 .parameters
@@ -263,26 +189,24 @@ fn far_off(fit: &ChannelFit) -> bool {
     fit.trued_rmse * fit.trued_rmse > FAR_ABOVE_THE_NOISE * fit.noise_floor * fit.noise_floor
 }
 
-/// Whether the mean square of what is left is at most `times` that of the noise.
-fn within<T>(hypothesis: &Hypothesis<T>, times: f64) -> bool {
-    hypothesis.misfits.iter().all(|m| m.sum_of_squares <= times * m.count as f64)
-}
-
 fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
-    let left_over = structured(findings) && !within(&selection.selected, HARDLY_ABOVE);
+    let floor = |times: f64| selection.selected.misfits.iter().all(|m| m.within(times, 1.0));
+    let left_over = structured(findings) && !selection.selected.within(HARDLY_ABOVE)
+        || findings.foretold > FORETOLD_WELL && !floor(HARDLY_ABOVE);
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
-        return match left_over || !within(&selection.selected, FAR_ABOVE_THE_NOISE) {
-            _ if rows == 0 || (rows < FEWEST_ROWS && !within(&selection.selected, AT_THE_NOISE)) => Verdict::NotExcited,
+        return match left_over || !selection.selected.within(ABOVE_THE_NOISE) {
+            _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(AT_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
             // What is clean where it was fitted and far off elsewhere was not moved enough to be told.
-            false if findings.fits.iter().any(far_off) => Verdict::NotExcited,
+            false if findings.fits.iter().any(far_off) && selection.selected.within(AT_THE_NOISE) => Verdict::NotExcited,
+            false if findings.fits.iter().any(far_off) => Verdict::Unexplained,
             false => Verdict::NoMismatch,
         };
     }
     // What fits the past to the noise and not the future was never excited enough to be told; what fits neither is wrong.
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
-        let clean = within(&selection.selected, FAR_ABOVE_THE_NOISE);
+        let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
         return if clean { Verdict::NotExcited } else { Verdict::Unexplained };
     }
     let unseen = findings.fits.iter().map(held_out_remainder).fold(0.0, f64::max);
@@ -327,6 +251,8 @@ fn effects<T: Twin>(
             mechanism: candidate.about.name.to_owned(),
             site: candidate.about.site,
             confidence,
+            gain: Some(place.gain),
+            margin: place.nearest,
             parameters,
             rivals,
             location: None,

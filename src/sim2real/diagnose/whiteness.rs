@@ -13,12 +13,25 @@ pub(super) struct ChannelMisfit {
     pub count: usize,
     /// In rows: about 1 for uncorrelated residuals, down to a half for alternating ones.
     pub autocorrelation_time: f64,
+    /// Mean square that noise of the colour of these residuals leaves, in units of the noise floor: 1 where they are white,
+    /// or too slow to be noise. The floor is found from differences of neighbouring rows, and coloured noise hides in them.
+    pub level: f64,
 }
 
 impl ChannelMisfit {
     /// Number of independent residuals that hold as much evidence.
     pub fn effective(&self) -> f64 {
         self.count as f64 / self.autocorrelation_time
+    }
+
+    /// What is left above noise of mean square `level`.
+    pub fn above(&self, level: f64) -> f64 {
+        (self.sum_of_squares - level * self.count as f64).max(0.0)
+    }
+
+    /// Whether the mean square is at most `times` that of noise of mean square `level`.
+    pub fn within(&self, times: f64, level: f64) -> bool {
+        self.sum_of_squares <= times * level * self.count as f64
     }
 }
 
@@ -39,11 +52,15 @@ pub(super) fn channel_misfits(residual: &[f64], blocks: &[Block], rounding: impl
             let count: usize = series.iter().map(|s| s.len()).sum();
             let white = rounding(channel) * count as f64;
             let coloured = if sum_of_squares > 0.0 { sum_of_squares / (sum_of_squares + white) } else { 0.0 };
+            let covariance = autocovariances(&series, usize::MAX).filter(|c| c[0] > 0.0);
+            let time = covariance.as_ref().map_or(1.0, |c| initial_positive_sequence(c).clamp(0.5, count.max(1) as f64));
+            let mean_square = sum_of_squares / count.max(1) as f64;
             ChannelMisfit {
                 channel: channel.to_owned(),
                 sum_of_squares,
                 count,
-                autocorrelation_time: 1.0 + coloured * (autocorrelation_time(&series) - 1.0),
+                autocorrelation_time: 1.0 + coloured * (time - 1.0),
+                level: if covariance.is_some_and(|c| coloured_like_noise(&c)) { mean_square.max(1.0) } else { 1.0 },
             }
         })
         .collect()
@@ -58,21 +75,35 @@ pub(super) fn of_channel<'a>(residual: &'a [f64], blocks: &[Block], channel: &st
 /// (Geyer, "Practical Markov chain Monte Carlo", Statistical Science 7 (1992)). The mean is not taken off: a residual
 /// that stays on one side is one piece of evidence, however long it is.
 pub(super) fn autocorrelation_time(series: &[&[f64]]) -> f64 {
-    let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
     let count: usize = series.iter().map(|s| s.len()).sum();
-    let Some(covariance) = autocovariances(series, longest).filter(|c| c[0] > 0.0) else { return 1.0 };
+    let covariance = autocovariances(series, usize::MAX).filter(|c| c[0] > 0.0);
+    covariance.map_or(1.0, |c| initial_positive_sequence(&c).clamp(0.5, count.max(1) as f64))
+}
+
+fn initial_positive_sequence(covariance: &[f64]) -> f64 {
     if covariance.len() < 2 {
         return 1.0;
     }
-    let mut time = -1.0;
-    for pair in covariance.chunks_exact(2) {
-        let sum = (pair[0] + pair[1]) / covariance[0];
-        if sum <= 0.0 {
-            break;
-        }
-        time += 2.0 * sum;
+    let sums = covariance.chunks_exact(2).map(|pair| (pair[0] + pair[1]) / covariance[0]);
+    sums.take_while(|sum| *sum > 0.0).fold(-1.0, |time, sum| time + 2.0 * sum)
+}
+
+/// Lags, in rows, by which the colour of noise is told.
+const NEAR_LAG: usize = 2;
+const FAR_LAG: usize = 6;
+/// Noise forgets at least this part of itself from one row to the next; a motion is smoother.
+const FORGETS: f64 = 0.045;
+/// Residuals less correlated than this over [`NEAR_LAG`] rows are white enough.
+const WHITE: f64 = 0.1;
+
+/// Whether residuals fall out of correlation as a first-order autoregressive process does, with white noise beside it: at
+/// once. What a missing law leaves is as smooth as the motion, and its correlation starts out flat.
+fn coloured_like_noise(covariance: &[f64]) -> bool {
+    if covariance.len() <= 4 * FAR_LAG {
+        return false;
     }
-    time.clamp(0.5, count.max(1) as f64)
+    let rho = |lag: usize| covariance[lag] / covariance[0];
+    rho(NEAR_LAG) > WHITE && rho(FAR_LAG) < rho(NEAR_LAG) * (1.0 - FORGETS).powi((FAR_LAG - NEAR_LAG) as i32)
 }
 
 /// Mean over [`LAGS`] lags of `N rho^2`: about 1 where nothing is left but white noise (Box & Pierce, JASA 65 (1970)).
@@ -138,6 +169,22 @@ mod tests {
             let found = autocorrelation_time(&[&series]);
             assert!((found / expected - 1.0).abs() < 0.25, "{phi}: {found} for {expected}");
         }
+    }
+
+    #[test]
+    fn noise_of_any_colour_makes_its_own_level_and_a_slow_misfit_does_not() {
+        let level = |series: &[f64]| {
+            let block = Block { part: 0, channel: "y".into(), range: 0..series.len(), rows: (0..series.len()).collect() };
+            channel_misfits(series, &[block], |_| 0.0)[0].level
+        };
+        let white = autoregressive(0.0, 5_000);
+        assert_eq!(level(&white), 1.0);
+        for phi in [0.6, 0.8, 0.92] {
+            let found = level(&autoregressive(phi, 5_000));
+            assert!((found * (1.0 - phi * phi) - 1.0).abs() < 0.3, "{phi}: {found}");
+        }
+        let slow: Vec<f64> = white.iter().enumerate().map(|(i, n)| n + 2.0 * (i as f64 * 0.03).sin()).collect();
+        assert_eq!(level(&slow), 1.0);
     }
 
     #[test]

@@ -1,0 +1,118 @@
+//! What is left beside what was found: how much of it, what it depends on, and whether the motion foretells it.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::select::Selection;
+use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
+use super::whiteness;
+use crate::sim2real::identify::{Block, Problem};
+use crate::sim2real::{Clock, Covariate, Part, Recording, Twin};
+
+/// A twin whose mean squared residual is at most this many times the noise needs nothing.
+pub(super) const AT_THE_NOISE: f64 = 1.5;
+
+/// The part of the recalibrated misfit above the noise that is left: of the channel in which most is left.
+///
+/// Where rows are messages the misfit is taken about its mean: a constant cost is something that any simulator can be
+/// given, and no measure of what was explained.
+pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> f64 {
+    let blocks = inquiry.problem(inquiry.twin, &inquiry.evidence.compared).blocks();
+    let about_mean = inquiry.twin.clock() == Clock::Event;
+    selection
+        .recalibrated
+        .misfits
+        .iter()
+        .zip(&selection.selected.misfits)
+        .filter_map(|(first, last)| {
+            let count = first.count as f64;
+            let residual = selection.recalibrated.fit.residual.as_slice();
+            let sum: f64 = whiteness::of_channel(residual, &blocks, &first.channel).iter().flat_map(|s| s.iter()).sum();
+            let constant = if about_mean { sum * sum / count.max(1.0) } else { 0.0 };
+            let misfit = first.sum_of_squares - constant - last.level * count;
+            (misfit > (AT_THE_NOISE - 1.0) * last.level * count).then(|| last.above(last.level) / misfit)
+        })
+        .fold(0.0, f64::max)
+}
+
+/// What the remaining residuals of messages depend on most.
+pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
+    // Below the noise there is nothing to explain, however regular it is: rounding of the arithmetic is regular too.
+    if inquiry.twin.clock() != Clock::Event || selected.within(AT_THE_NOISE) {
+        return None;
+    }
+    let parts = &inquiry.evidence.compared;
+    let residual = selected.fit.residual.as_slice();
+    inquiry
+        .problem(&selected.twin, parts)
+        .blocks()
+        .iter()
+        .filter_map(|block| {
+            let covariates = inquiry.twin.covariates(parts[block.part].recording);
+            strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates)
+        })
+        .max_by(|a, b| a.strength.total_cmp(&b.strength))
+}
+
+/// The part of what is left of sampled signals that the motion foretells on held-out data.
+///
+/// The motion is the simulated one: what is measured holds the noise itself, and coloured noise would foretell itself.
+pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> f64 {
+    if inquiry.twin.clock() == Clock::Event {
+        return 0.0;
+    }
+    let held_out: Vec<Part<'_, T::Stimulus>> = match inquiry.evidence.window {
+        Some(seconds) => inquiry.evidence.held_out.iter().flat_map(|p| p.windows(seconds)).collect(),
+        None => inquiry.evidence.held_out.clone(),
+    };
+    let mut simulated: BTreeMap<usize, Recording<T::Stimulus>> = BTreeMap::new();
+    for part in inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out) {
+        simulated.entry(identity(part.recording)).or_insert_with(|| part.recording.clone());
+    }
+    let mut left = |parts: &[Part<'_, T::Stimulus>]| -> Vec<Left> {
+        let problem = inquiry.problem(&selected.twin, parts);
+        let residual = problem.evaluate(&selected.fit.values, &inquiry.evidence.initial_state(&problem), &[]).residual;
+        let blocks = problem.blocks();
+        follow(&problem, &blocks, &residual, &mut simulated);
+        let first = blocks.first().map(|b| b.channel.clone());
+        let of_first = blocks.into_iter().filter(|b| Some(&b.channel) == first.as_ref());
+        of_first
+            .map(|b| Left {
+                recording: identity(parts[b.part].recording),
+                residual: residual.as_slice()[b.range].to_vec(),
+                rows: b.rows,
+            })
+            .collect()
+    };
+    let (fitted, unseen) = (left(&inquiry.evidence.compared), left(&held_out));
+    let covariates: BTreeMap<usize, Vec<Covariate>> =
+        simulated.iter().map(|(identity, recording)| (*identity, inquiry.twin.covariates(recording))).collect();
+    regression(&fitted, &unseen, &covariates)
+}
+
+/// Puts what was simulated in the place of what was measured.
+fn follow<T: Twin>(
+    problem: &Problem<'_, T>,
+    blocks: &[Block],
+    residual: &DVector<f64>,
+    simulated: &mut BTreeMap<usize, Recording<T::Stimulus>>,
+) {
+    for block in blocks {
+        let noise = problem.weights.iter().find(|w| w.channel == block.channel).map_or(0.0, |w| w.noise);
+        let recording = simulated.get_mut(&identity(problem.parts[block.part].recording));
+        let channel = recording.and_then(|r| r.measured.iter_mut().find(|m| m.channel == block.channel));
+        let Some(channel) = channel else { continue };
+        for (row, at) in block.rows.iter().zip(block.range.clone()) {
+            if let Some(sample) = &mut channel.samples[*row] {
+                *sample -= noise * residual[at];
+            }
+        }
+    }
+}
+
+/// What tells a recording from others: two may well have the same name.
+fn identity<S>(recording: &Recording<S>) -> usize {
+    std::ptr::from_ref(recording) as usize
+}
