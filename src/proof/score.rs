@@ -129,7 +129,8 @@ impl Entry {
             Kind::Pair => self.exact(&answer),
             Kind::Null(_) => answer.names.is_empty() && !answer.unknown,
             Kind::Outside => self.said_so(&answer),
-            Kind::NotExcited => answer.names.is_empty() && !answer.unknown,
+            // It need not be seen; what is there may be.
+            Kind::NotExcited => !answer.unknown && answer.names.iter().all(|name| self.conceals(name)),
         }
     }
 

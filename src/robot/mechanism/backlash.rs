@@ -36,7 +36,8 @@ where
             law: "play: u follows the command at half of width; gap: motor and link, apart by up to gap, push where they touch",
             source: "Tao & Kokotović (1996), ch. 2; Nordin & Gutman, Automatica 38 (2002), section 2",
             remedy: "preload or replace the gears, or model motor and link with the gap between them",
-            contains: &[],
+            // A touch that gives, without a gap, is a shaft.
+            contains: &["compliance"],
         }
     }
 

@@ -8,6 +8,7 @@
 //! acted, and `experiment` designs, from the commands of `excitation`, what to record where rivals are left.
 
 mod activity;
+mod confidence;
 mod diagnosis;
 mod evidence;
 mod excitation;
@@ -46,7 +47,7 @@ use rivals::Place;
 use select::Selection;
 
 use super::identify::Fit;
-use super::{ChannelWeight, Clock, Recording, Seed, Twin};
+use super::{ChannelWeight, Clock, Parameter, Recording, Seed, Twin};
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
@@ -179,6 +180,7 @@ fn followed<T: Twin>(
         foretold: remainder::foretold(&inquiry, &selection.selected),
         std: inflated(&inquiry, &selection.selected, &trued),
         trued: trued.clone(),
+        sampled: twin.clock() != Clock::Event,
     };
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
     verdict::recognized(&mut diagnosis, &inquiry, found);
@@ -271,5 +273,20 @@ fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, fit: 
         .map(|m| (m.sum_of_squares / m.count.max(1) as f64).max(1.0) * m.autocorrelation_time.max(1.0))
         .fold(1.0, f64::max)
         .sqrt();
-    fit.std.iter().map(|std| std * factor).collect()
+    let own = inquiry.twin.parameters().len();
+    let parameters = hypothesis.twin.parameters().iter().enumerate();
+    let widened = |(k, p): (usize, &Parameter)| {
+        let std = fit.std[k] * factor;
+        // Of messages the laws are known better: what is charged is charged by a rule.
+        let of_another_form = k >= own && std > 0.0 && inquiry.twin.clock() != Clock::Event;
+        let relative = if p.unit == "s" { 0.0 } else { FORM * fit.values[k].abs() };
+        if of_another_form { (BEYOND_NOISE * std).hypot(relative) } else { std }
+    };
+    parameters.map(widened).collect()
 }
+
+/// What the constants of laws are off by because the real thing has another form, as a part of them, but for times: ...
+const FORM: f64 = 0.04;
+/// ... and by how much more than noise makes them. With both, among right names of the blind benchmark's development seeds, the
+/// intervals hold the truth as often as they say.
+const BEYOND_NOISE: f64 = 2.0;

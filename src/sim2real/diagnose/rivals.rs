@@ -2,12 +2,15 @@
 
 use rayon::prelude::*;
 
+use super::confidence::by_evidence;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
-use super::select::{SHARE, Selection, gain, lead, share};
+use super::select::{SHARE, Selection, completes, gain, lead, share};
 use crate::sim2real::identify::Effort;
 use crate::sim2real::{About, Candidate, Twin};
 
+/// What a law explains more of the first misfit than a special case of it counts from this part on.
+const SLIGHT: f64 = 0.02;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
 /// A rival that loses by more than this after a few steps is not followed further.
@@ -31,8 +34,34 @@ pub(super) struct Place {
 /// Swaps tried at the most.
 const SWAPS: usize = 4;
 
-/// Puts rivals that do better in the place of what was selected, until none does; then lists those that remain.
-pub(super) fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, mut selection: Selection<T>) -> (Selection<T>, Vec<Place>) {
+/// A further mechanism that explains little, and is no more likely than this beside its rivals, is not worth a name ...
+const ANYBODYS: f64 = 0.4;
+/// ... where what is left without it has at most this many times the mean square of the noise.
+const HARDLY_LEFT: f64 = 2.0;
+
+/// Puts rivals that do better in the place of what was selected, until none does; leaves out what might as well be
+/// anything; then lists the rivals that remain.
+pub(super) fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, selection: Selection<T>) -> (Selection<T>, Vec<Place>) {
+    let (mut selection, mut places) = swapped(inquiry, selection);
+    while let Some(place) = anybodys(&selection, &places) {
+        selection = selection.dropped(inquiry, place);
+        places = rivals(inquiry, &selection);
+    }
+    (selection, places)
+}
+
+/// The mechanism, one of several, that explains a small share only and is hardly more likely than its rivals.
+fn anybodys<T: Twin>(selection: &Selection<T>, places: &[Place]) -> Option<usize> {
+    let whole = &selection.selected;
+    (0..places.len()).filter(|_| places.len() > 1).find(|place| {
+        let less = &selection.without[*place];
+        let little = share(&selection.recalibrated, less, whole) < SHARE && less.within(HARDLY_LEFT);
+        little && by_evidence(&places[*place]).0 < ANYBODYS
+    })
+}
+
+/// Puts rivals that do better in the place of what was selected, until none does.
+fn swapped<T: Twin>(inquiry: &Inquiry<'_, T>, mut selection: Selection<T>) -> (Selection<T>, Vec<Place>) {
     for _ in 0..SWAPS {
         let places = rivals(inquiry, &selection);
         let best = places
@@ -105,9 +134,8 @@ fn likely<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, less: &Hy
 
 /// By how much the rival loses; negative where it is to be preferred.
 ///
-/// A law with more constants must explain a share of the first misfit more, for laws never have quite the form of the real
-/// thing, and one more constant bends anything a little nearer; one that contains another must besides be better by more
-/// than others.
+/// A law that contains another as a special case must explain a share of the first misfit more than that, or all that is left
+/// of it, and be better by more than others: laws never have quite the form of the real thing, and one more constant bends anything a little nearer.
 fn loss<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     first: &Hypothesis<T>,
@@ -116,37 +144,13 @@ fn loss<T: Twin>(
     (own, other): (About, About),
 ) -> f64 {
     let loss = lead(inquiry, first, selected, rival);
-    let contained = own.contains.contains(&other.name);
-    let containing = other.contains.contains(&own.name);
-    if contained || rival.free() < selected.free() {
-        let slight = share(first, rival, selected) < SHARE;
-        return if slight { loss.min(-1.0) } else { loss - if contained { WITHIN } else { 0.0 } };
+    if own.contains.contains(&other.name) && rival.free() < selected.free() {
+        let slight = share(first, rival, selected) < SLIGHT && !completes(rival, selected);
+        return if slight { loss.min(-1.0) } else { loss - WITHIN };
     }
-    if containing || rival.free() > selected.free() {
-        let slight = share(first, selected, rival) < SHARE;
-        return if slight { loss.max(0.5 * WITHIN) } else { loss + if containing { WITHIN } else { 0.0 } };
+    if other.contains.contains(&own.name) && rival.free() > selected.free() {
+        let slight = share(first, selected, rival) < SLIGHT && !completes(selected, rival);
+        return if slight { loss.max(0.5 * WITHIN) } else { loss + WITHIN };
     }
     loss
-}
-
-/// Probabilities of the selected mechanism and of each rival, from what they lose: the gain is twice the logarithm of a
-/// likelihood ratio. That nothing is missing in its place takes part too.
-pub(super) fn confidences(place: &Place) -> (f64, Vec<f64>) {
-    let weight = |loss: f64| (-0.5 * loss.clamp(-60.0, 600.0)).exp();
-    let others: Vec<f64> = place.others.iter().map(|(_, loss)| weight(*loss)).collect();
-    let total = 1.0 + weight(place.gain) + others.iter().sum::<f64>();
-    (1.0 / total, others.into_iter().map(|w| w / total).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn equal_rivals_share_and_distant_ones_do_not_count() {
-        let (own, others) = confidences(&Place { gain: 100.0, nearest: None, others: vec![(1, 0.0)] });
-        assert!((own - 0.5).abs() < 1e-9 && (others[0] - 0.5).abs() < 1e-9);
-        let (own, _) = confidences(&Place { gain: 100.0, nearest: None, others: vec![(1, 9.0)] });
-        assert!(own > 0.98);
-    }
 }

@@ -11,11 +11,14 @@ use crate::sim2real::{Candidate, Twin};
 
 /// A mechanism must gain more than this to be added.
 pub(super) const ACCEPT: f64 = 10.0;
-/// A further mechanism must explain at least this part of the first misfit, for laws never have quite the form of the
-/// real thing, and what they leave looks like something else ...
-pub(super) const SHARE: f64 = 0.03;
+/// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
+/// quite the form of the real thing, and what they leave looks like something else ...
+pub(super) const SHARE: f64 = 0.01;
+const SHARE_OF_MORE: f64 = 0.03;
 /// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
 const COMPLETES: f64 = 0.8;
+/// Residuals with an autocorrelation time below this [rows] are taken for white.
+const NEARLY_WHITE: f64 = 2.0;
 /// A mechanism must move at least this many rows by more than the noise.
 const INFORMATIVE_ROWS: usize = 25;
 /// A twin that leaves a mean squared residual of at most this many times the noise is not bent by what it lacks.
@@ -128,6 +131,12 @@ impl<T: Twin> Selection<T> {
         Self { recalibrated, selected, without, scores: self.scores.clone() }
     }
 
+    /// The selection without its `place`-th mechanism.
+    pub fn dropped(&self, inquiry: &Inquiry<'_, T>, place: usize) -> Self {
+        let (recalibrated, selected, without) = pruned(inquiry, &self.recalibrated, vec![self.without[place].clone()]);
+        Self { recalibrated, selected, without, scores: self.scores.clone() }
+    }
+
     /// The selection with the `place`-th mechanism replaced by candidate `other`, and what is no longer needed left out.
     pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
         let less = &self.without[place];
@@ -136,7 +145,7 @@ impl<T: Twin> Selection<T> {
             pruned(inquiry, &self.recalibrated, vec![inquiry.extended(less, other, &screened, Effort::Thorough)]);
         // A simpler law is preferred although it explains a little less.
         let simpler = selected.free() < self.selected.free()
-            || self.selected.added.get(place).is_some_and(|own| {
+            && self.selected.added.get(place).is_some_and(|own| {
                 let (own, other) = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
                 own.contains.contains(&other.name)
             });
@@ -320,10 +329,27 @@ fn needed_share<T>(first: &Hypothesis<T>, parent: &Hypothesis<T>) -> f64 {
         return 0.0;
     }
     let least = |(first, left): (&ChannelMisfit, &ChannelMisfit)| {
-        let most = (SHARE * above_noise(first, left.level)).min(COMPLETES * above_noise(left, left.level));
+        let most = (share_of(parent.added.len() + 1) * above_noise(first, left.level))
+            .min(COMPLETES * above_noise(left, left.level));
         most / left.sum_of_squares.max(1e-300)
     };
     first.misfits.iter().zip(&parent.misfits).map(least).fold(f64::INFINITY, f64::min)
+}
+
+/// The part of the first misfit that the last of so many mechanisms must explain.
+fn share_of(mechanisms: usize) -> f64 {
+    if mechanisms > 2 { SHARE_OF_MORE } else { SHARE }
+}
+
+/// Whether `better` explains nearly all that `other` leaves above noise as white as what `better` leaves.
+pub(super) fn completes<T>(other: &Hypothesis<T>, better: &Hypothesis<T>) -> bool {
+    other.misfits.iter().zip(&better.misfits).any(|(other, better)| {
+        let mean_square = better.sum_of_squares / better.count.max(1) as f64;
+        let white = better.autocorrelation_time < NEARLY_WHITE || better.level > 1.0;
+        let level = if white { mean_square } else { 1.0 };
+        let explained = other.sum_of_squares - better.sum_of_squares;
+        explained > 0.0 && explained >= COMPLETES * other.above(level)
+    })
 }
 
 /// What a misfit has above noise of that level.
@@ -388,7 +414,7 @@ fn needed<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, less: &Hypot
         || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), whole)| {
             let explained = less.sum_of_squares - whole.sum_of_squares;
             let (all, left) = (above_noise(first, whole.level), above_noise(less, whole.level));
-            explained >= SHARE * all || explained >= COMPLETES * left
+            explained >= share_of(whole.added.len()) * all || explained >= COMPLETES * left
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let moved = (0..rows).filter(|i| (less.fit.residual[*i] - whole.fit.residual[*i]).abs() > 1.0).count();

@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::confidence::{by_evidence, calibrated};
 use super::diagnosis::{
     ChannelFit, Checks, Diagnosis, Effect, Estimate, ParameterChange, Rival, SCHEMA, Score, Verdict, Where,
 };
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::remainder::AT_THE_NOISE;
-use super::rivals::{Place, confidences};
+use super::rivals::Place;
 use super::select::Selection;
 use super::structure::Dependence;
 use super::{Found, whiteness, words};
@@ -16,6 +17,10 @@ use crate::sim2real::{Clock, Twin};
 
 /// A remainder above this part of the first misfit is more than an error of form.
 const FORM_ERROR: f64 = 0.10;
+/// Close to the noise a remainder on held-out data is known less well: above this part it is more than an error of form.
+const MOSTLY_LEFT: f64 = 0.35;
+/// The mean square of the noise is known to this factor.
+const NOISE_KNOWN: f64 = 1.05;
 /// A residual counts as structured where a covariate's F test is this strong (-log10 p): complete models reach 5.
 const DEPENDENT: f64 = 8.0;
 /// A residual counts as structured where a regression foretells this part of it on held-out data.
@@ -47,6 +52,8 @@ pub(super) struct Findings {
     pub foretold: f64,
     pub std: Vec<f64>,
     pub trued: Fit,
+    /// Whether rows are samples of signals, rather than messages.
+    pub sampled: bool,
 }
 
 /// The whole result.
@@ -177,11 +184,18 @@ fn structured(findings: &Findings) -> bool {
     findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
 }
 
-/// The part of the recalibrated misfit above the noise that is left on held-out data, where what is left stands far above
-/// the noise.
+/// The part of the recalibrated misfit above the noise that is left on held-out data; the noise is known to
+/// [`NOISE_KNOWN`].
 fn held_out_remainder(fit: &ChannelFit) -> f64 {
-    let above_noise = |rmse: f64| rmse * rmse - fit.noise_floor * fit.noise_floor;
-    if far_off(fit) { above_noise(fit.trued_rmse) / above_noise(fit.recalibrated_rmse) } else { 0.0 }
+    let above = |rmse: f64, known: f64| (rmse * rmse - known * fit.noise_floor * fit.noise_floor).max(0.0);
+    let misfit = above(fit.recalibrated_rmse, 1.0);
+    if misfit > 0.0 { above(fit.trued_rmse, NOISE_KNOWN) / misfit } else { 0.0 }
+}
+
+/// Whether so much is left on held-out data that what was named does not explain them.
+fn fails_unseen(fit: &ChannelFit, sampled: bool) -> bool {
+    let remainder = held_out_remainder(fit);
+    far_off(fit) && remainder > FORM_ERROR || sampled && remainder > MOSTLY_LEFT
 }
 
 /// Whether what is left on held-out data stands far above the noise.
@@ -209,8 +223,8 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
         return if clean { Verdict::NotExcited } else { Verdict::Unexplained };
     }
-    let unseen = findings.fits.iter().map(held_out_remainder).fold(0.0, f64::max);
-    if unseen > FORM_ERROR || left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
+    let unseen = findings.fits.iter().any(|fit| fails_unseen(fit, findings.sampled));
+    if unseen || left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
         return Verdict::Unexplained;
     }
     if effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
@@ -223,10 +237,11 @@ fn effects<T: Twin>(
     findings: &Findings,
 ) -> Vec<Effect> {
     let mut at = inquiry.twin.parameters().len();
+    let unseen = findings.fits.iter().map(held_out_remainder).fold(0.0, f64::max);
     let mut effects: Vec<Effect> = Vec::new();
     for (number, place) in selected.added.iter().zip(places) {
         let candidate = &inquiry.candidates[*number];
-        let (confidence, others) = confidences(place);
+        let (confidence, others) = if findings.sampled { calibrated(place, unseen) } else { by_evidence(place) };
         let parameters = candidate
             .form
             .parameters
