@@ -3,6 +3,7 @@
 use super::estimate::{local, motion, rounding, typical};
 use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
+use super::sine::{sine, sines};
 use crate::sim2real::{
     Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
 };
@@ -229,6 +230,42 @@ pub struct JointDynamics {
     gain: Vec<f64>,
 }
 
+/// Lanes whose sines are taken at once.
+const BLOCK: usize = 8;
+
+impl JointDynamics {
+    /// One step of one lane; `sine` is that of its position in the middle of the step.
+    #[inline]
+    fn step(&self, tick: Tick, lane: usize, state: &mut Motion, sine: f64, command: f64, effect: &Push) {
+        let half = 0.5 * tick.step;
+        let viscous = self.viscous_friction[lane];
+        let inertia = self.inertia[lane] + effect.inertia;
+        let midway = state.position + half * state.velocity;
+        let mut torque = self.gain[lane] * command + effect.effort - effect.stiffness * midway;
+        if self.gravity_torque[lane] != 0.0 {
+            torque -= self.gravity_torque[lane] * sine;
+        }
+        if effect.creeping_friction > 0.0 {
+            let driven = |velocity: f64| torque - viscous * velocity;
+            let stopping = |velocity: f64| {
+                let whole = CREEP_SHARE * (inertia * CREEP_RATE * velocity + driven(velocity));
+                whole.max(-effect.creeping_friction).min(effect.creeping_friction)
+            };
+            // As of the middle of the step: creep is fast for a step.
+            let change = (driven(state.velocity) - stopping(state.velocity)) / inertia;
+            torque -= stopping(state.velocity + half * change);
+        }
+        // Damping by Crank-Nicolson, on both sides of the step.
+        let damping = half * (viscous + effect.damping);
+        let whole = inertia + damping;
+        let free = (state.velocity * (inertia - damping) + tick.step * torque) / whole;
+        let held = if effect.dry_friction > 0.0 { tick.step * effect.dry_friction / whole } else { 0.0 };
+        let velocity = if held > 0.0 { rubbed(state.velocity, free, held) } else { free };
+        state.position = midway + half * velocity;
+        state.velocity = velocity;
+    }
+}
+
 impl Dynamics<Joint> for JointDynamics {
     fn initial(&self, initial: &Thetas) -> Vec<Motion> {
         let lanes = initial.row(0).iter().zip(initial.row(1));
@@ -237,32 +274,23 @@ impl Dynamics<Joint> for JointDynamics {
 
     fn advance(&self, tick: Tick, states: &mut [Motion], _: &[()], commands: &[Signal], effects: &[Push]) {
         let half = 0.5 * tick.step;
-        let parameters = self.inertia.iter().zip(&self.viscous_friction).zip(&self.gravity_torque).zip(&self.gain);
-        let lanes = states.iter_mut().zip(commands).zip(effects).zip(parameters);
-        for (((state, command), effect), (((inertia, viscous), gravity), gain)) in lanes {
-            let inertia = inertia + effect.inertia;
-            let midway = state.position + half * state.velocity;
-            let mut torque = gain * command.0 + effect.effort - effect.stiffness * midway;
-            // The sine is most of the work of a step: not where nothing weighs on the joint.
-            if *gravity != 0.0 {
-                torque -= gravity * midway.sin();
+        let midway = |state: &Motion| state.position + half * state.velocity;
+        let lanes = states.len();
+        let mut first = 0;
+        // The sine is most of the work of a step: of several lanes at once, and not where nothing weighs on the joint.
+        while first + BLOCK <= lanes {
+            let own = first..first + BLOCK;
+            let weighs = self.gravity_torque[own.clone()].iter().any(|gravity| *gravity != 0.0);
+            let angles: [f64; BLOCK] = std::array::from_fn(|k| midway(&states[first + k]));
+            let sines = if weighs { sines(&angles) } else { [0.0; BLOCK] };
+            for (lane, sine) in own.zip(sines) {
+                self.step(tick, lane, &mut states[lane], sine, commands[lane].0, &effects[lane]);
             }
-            if effect.creeping_friction > 0.0 {
-                let driven = |velocity: f64| torque - viscous * velocity;
-                let stopping = |velocity: f64| {
-                    let whole = CREEP_SHARE * (inertia * CREEP_RATE * velocity + driven(velocity));
-                    whole.max(-effect.creeping_friction).min(effect.creeping_friction)
-                };
-                // As of the middle of the step: creep is fast for a step.
-                let change = (driven(state.velocity) - stopping(state.velocity)) / inertia;
-                torque -= stopping(state.velocity + half * change);
-            }
-            let damping = half * (viscous + effect.damping) / inertia;
-            let free = (state.velocity * (1.0 - damping) + tick.step * torque / inertia) / (1.0 + damping);
-            let held = tick.step * effect.dry_friction / (inertia * (1.0 + damping));
-            let velocity = if held > 0.0 { rubbed(state.velocity, free, held) } else { free };
-            state.position = midway + half * velocity;
-            state.velocity = velocity;
+            first += BLOCK;
+        }
+        for lane in first..lanes {
+            let sine = if self.gravity_torque[lane] != 0.0 { sine(midway(&states[lane])) } else { 0.0 };
+            self.step(tick, lane, &mut states[lane], sine, commands[lane].0, &effects[lane]);
         }
     }
 

@@ -63,6 +63,16 @@ pub struct Evaluation {
     pub objective: f64,
 }
 
+/// One part followed: residuals and their derivatives, before what initial states explain is taken out.
+struct Followed {
+    residual: DVector<f64>,
+    derivatives: Vec<DVector<f64>>,
+    by_initial: Vec<DVector<f64>>,
+}
+
+/// All parts followed.
+pub(super) struct Runs(Vec<Followed>);
+
 /// One part evaluated: residuals, and one column a perturbed parameter.
 struct Piece {
     residual: DVector<f64>,
@@ -102,17 +112,26 @@ impl<S: Simulator> Problem<'_, S> {
     /// The parts start from `state`, to first order moved to where they are best started from.
     #[must_use]
     pub fn evaluate(&self, theta: &[f64], state: &State, free: &[usize]) -> Evaluation {
-        let pieces: Vec<Piece> = self
-            .parts
-            .par_iter()
-            .enumerate()
-            .map(|(number, part)| self.piece(part, theta, &state.initial[number], &state.values[number], state.misfit, free))
-            .collect();
-        self.assemble(&pieces, free.len())
+        self.projected(&self.followed(theta, state, free), state)
+    }
+
+    /// Follows all parts, and their derivatives by the parameters numbered in `free` and by initial states.
+    pub(super) fn followed(&self, theta: &[f64], state: &State, free: &[usize]) -> Runs {
+        let parts = self.parts.par_iter().zip(&state.initial).zip(&state.values);
+        Runs(parts.map(|((part, initial), start)| self.follow(part, theta, initial, start, free)).collect())
+    }
+
+    /// What is left of `runs` once the initial states of `state`, from which they were followed, are moved to where they fit
+    /// best: another misfit weighs their priors anew, and needs no other runs.
+    pub(super) fn projected(&self, runs: &Runs, state: &State) -> Evaluation {
+        let parts = runs.0.par_iter().zip(&state.initial).zip(&state.values);
+        let pieces: Vec<Piece> = parts.map(|((run, initial), start)| project(run, initial, start, state.misfit)).collect();
+        self.assemble(&pieces)
     }
 
     /// Lays the pieces one after the other: all measured residuals first, then all prior rows.
-    fn assemble(&self, pieces: &[Piece], columns: usize) -> Evaluation {
+    fn assemble(&self, pieces: &[Piece]) -> Evaluation {
+        let columns = pieces.first().map_or(0, |p| p.jacobian.ncols());
         let measured: Vec<usize> = pieces.iter().map(|p| p.residual.len() - p.initial_step.len()).collect();
         let total: usize = pieces.iter().map(|p| p.residual.len()).sum();
         let mut residual = DVector::zeros(total);
@@ -189,15 +208,14 @@ impl<S: Simulator> Problem<'_, S> {
         (0..points.len()).map(|k| parts.iter().map(|values| values[k]).sum()).collect()
     }
 
-    fn piece(
+    fn follow(
         &self,
         part: &Part<'_, S::Stimulus>,
         theta: &[f64],
         initial: &[Parameter],
         start: &[f64],
-        misfit: f64,
         free: &[usize],
-    ) -> Piece {
+    ) -> Followed {
         let parameters = self.simulator.parameters();
         let steps: Vec<(usize, f64)> = free
             .iter()
@@ -212,10 +230,12 @@ impl<S: Simulator> Problem<'_, S> {
             lanes.push(lane);
         }
         let trajectories = self.simulator.rollout(&Thetas::from_lanes(&lanes), part.recording, part.followed(), self.seed);
-        let columns: Vec<DVector<f64>> = trajectories.iter().map(|t| self.residual(part, t)).collect();
-        let derivatives: Vec<DVector<f64>> =
-            columns[1..].iter().zip(&steps).map(|(moved, (_, step))| (moved - &columns[0]) / *step).collect();
-        project(&columns[0], &derivatives[..free.len()], &derivatives[free.len()..], initial, start, misfit)
+        let mut columns = trajectories.iter().map(|t| self.residual(part, t));
+        let residual = columns.next().unwrap_or_else(|| DVector::zeros(0));
+        let mut derivatives: Vec<DVector<f64>> =
+            columns.zip(&steps).map(|(moved, (_, step))| (moved - &residual) / *step).collect();
+        let by_initial = derivatives.split_off(free.len());
+        Followed { residual, derivatives, by_initial }
     }
 
     fn residual(&self, part: &Part<'_, S::Stimulus>, trajectory: &[crate::sim2real::Simulated]) -> DVector<f64> {
@@ -275,14 +295,8 @@ fn weight(parameter: &Parameter, misfit: f64) -> f64 {
 ///
 /// With `A = [J_i; W]`, where `W` holds the priors' weights, the best step of the initial state leaves
 /// `b - Q Q' b` of `b = [r; W d]`, and likewise of every column of the Jacobian.
-fn project(
-    residual: &DVector<f64>,
-    derivatives: &[DVector<f64>],
-    by_initial: &[DVector<f64>],
-    initial: &[Parameter],
-    start: &[f64],
-    misfit: f64,
-) -> Piece {
+fn project(run: &Followed, initial: &[Parameter], start: &[f64], misfit: f64) -> Piece {
+    let Followed { residual, derivatives, by_initial } = run;
     let (rows, count) = (residual.len(), initial.len());
     let weight: Vec<f64> = initial.iter().map(|p| weight(p, misfit)).collect();
     let extended = |top: &DVector<f64>, bottom: &dyn Fn(usize) -> f64| {
