@@ -28,10 +28,14 @@ pub(super) fn sine(angle: f64) -> f64 {
     if within(angle) { polynomial(angle) } else { angle.sin() }
 }
 
-/// The sines of `N` angles [rad]: of each the same bits as of [`sine`].
+/// Puts the sine of each angle [rad] in its place: the same bits as those of [`sine`].
 #[inline]
-pub(super) fn sines<const N: usize>(angles: &[f64; N]) -> [f64; N] {
-    if angles.iter().all(|angle| within(*angle)) { angles.map(polynomial) } else { angles.map(sine) }
+pub(super) fn sines(angles: &mut [f64]) {
+    if angles.iter().fold(true, |all, angle| all & within(*angle)) {
+        angles.iter_mut().for_each(|angle| *angle = polynomial(*angle));
+    } else {
+        angles.iter_mut().for_each(|angle| *angle = sine(*angle));
+    }
 }
 
 /// Whether the polynomial will do; not for what is no number.
@@ -40,7 +44,7 @@ fn within(angle: f64) -> bool {
     angle.abs() <= LARGEST
 }
 
-#[inline]
+#[inline(always)]
 fn polynomial(angle: f64) -> f64 {
     let shifted = angle * std::f64::consts::FRAC_1_PI + ROUNDING;
     let turns = shifted - ROUNDING;
@@ -68,9 +72,11 @@ mod tests {
                 assert!(apart <= 2.0 * f64::EPSILON, "{angle}: {} and {}", sine(angle), angle.sin());
             }
         }
-        let block = [0.3, -2.0, 1e4, 7.1];
-        assert_eq!(sines(&block), block.map(sine));
-        assert_eq!(sines(&[0.3, 1e9]), [sine(0.3), 1e9_f64.sin()]);
+        for angles in [[0.3, -2.0, 1e4, 7.1, 0.0], [0.3, -2.0, 1e9, 7.1, 0.0]] {
+            let mut all = angles;
+            sines(&mut all);
+            assert_eq!(all, angles.map(sine));
+        }
         assert_eq!(sine(0.0), 0.0);
         assert_eq!(sine(1e-9), 1e-9_f64.sin());
     }
