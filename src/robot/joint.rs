@@ -288,7 +288,9 @@ impl Dynamics<Joint> for JointDynamics {
             // The sine is most of the work of a step: of several lanes at once, and not where nothing weighs on the joint.
             if parameters.iter().any(|lane| lane.gravity_torque != 0.0) {
                 let sine = &mut sine[..states.len()];
-                sine.iter_mut().zip(states.iter()).for_each(|(angle, state)| *angle = state.position + half * state.velocity);
+                sine.iter_mut()
+                    .zip(states.iter())
+                    .for_each(|(angle, state)| *angle = state.position + half * state.velocity);
                 sines(sine);
             }
             let lanes = states.iter_mut().zip(parameters).zip(&commands[own.clone()]).zip(&effects[own]).zip(sine);

@@ -491,7 +491,7 @@ impl Follow {
 
     fn record<P: Plant>(&mut self, run: &mut Run<P>, time: f64) {
         let width = self.width();
-        let row = &mut self.collected[self.rows % COLLECTED * width..][..width];
+        let row = &mut self.collected[(self.rows % COLLECTED) * width..][..width];
         for (values, observation) in row.chunks_exact_mut(self.channels.max(1)).zip(run.observe(time)) {
             values.iter_mut().enumerate().for_each(|(k, value)| *value = observation.channel(k));
         }

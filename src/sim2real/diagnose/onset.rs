@@ -215,12 +215,7 @@ fn refined<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, whole:
         let row = time.partition_point(|t| *t < at).clamp(whole.rows.start + 2, whole.rows.end - 2);
         let one = |start: usize, end: usize| {
             let part = [Part { recording: whole.recording, start, rows: start..end }];
-            let problem = Problem {
-                simulator: &twin,
-                parts: &part,
-                weights: &inquiry.evidence.weights,
-                seed: inquiry.seed,
-            };
+            let problem = Problem { simulator: &twin, parts: &part, weights: &inquiry.evidence.weights, seed: inquiry.seed };
             let fit = fit_smooth(&problem, &hypothesis.fit.values, &free, &State::unknown(&problem));
             fit.residual.norm_squared() + fit.prior
         };

@@ -332,9 +332,8 @@ fn project(run: &Followed, initial: &[Parameter], start: &[f64], misfit: f64) ->
     (0..count).for_each(|k| a[(rows + k, k)] = weight[k]);
     let qr = a.qr();
     let (q, r) = (qr.q(), qr.r());
-    let solved = |along: &DMatrix<f64>| {
-        r.solve_upper_triangular(along).unwrap_or_else(|| DMatrix::zeros(count, along.ncols()))
-    };
+    let solved =
+        |along: &DMatrix<f64>| r.solve_upper_triangular(along).unwrap_or_else(|| DMatrix::zeros(count, along.ncols()));
     let along = DMatrix::from_columns(&[q.tr_mul(&b)]);
     let initial_step = (-solved(&along)).iter().copied().collect();
     b.gemv(-1.0, &q, &along.column(0), 1.0);
