@@ -253,15 +253,11 @@ impl Mover for Equations {
     }
 
     fn drive(dynamics: &EquationsDynamics, lane: usize, state: &Vec<f64>, command: &Signal) -> f64 {
-        dynamics.effort(lane, state, command.0) - dynamics.effort(lane, state, 0.0)
+        dynamics.effort(lane, state, command.0, None) - dynamics.effort(lane, state, 0.0, None)
     }
 
     fn external(dynamics: &EquationsDynamics, lane: usize, state: &Vec<f64>, position: f64) -> f64 {
-        let mut there = state.clone();
-        if let Some(moving) = &dynamics.model.moving {
-            (there[moving.position], there[moving.velocity]) = (position, 0.0);
-        }
-        dynamics.effort(lane, &there, 0.0)
+        dynamics.effort(lane, state, 0.0, Some(position))
     }
 }
 
@@ -288,8 +284,9 @@ impl EquationsDynamics {
         self.model.rates.memory(1, self.rows.iter().map(|row| &row[lane..=lane]))
     }
 
-    /// Effort on what moves, in a lane in that state; inputs beside the command are taken for 0.
-    fn effort(&self, lane: usize, state: &[f64], command: f64) -> f64 {
+    /// Effort on what moves, in a lane in that state, or at rest at another position; inputs beside the command are taken
+    /// for 0.
+    fn effort(&self, lane: usize, state: &[f64], command: f64, position: Option<f64>) -> f64 {
         let Some(moving) = &self.model.moving else { return 0.0 };
         let mut alone = self.alone.take();
         if alone.is_empty() {
@@ -298,6 +295,10 @@ impl EquationsDynamics {
         let memory = &mut alone[lane];
         memory.slot_mut(self.model.input_slot(0))[0] = command;
         state.iter().enumerate().for_each(|(k, value)| memory.slot_mut(self.model.state_slot(k))[0] = *value);
+        if let Some(position) = position {
+            memory.slot_mut(self.model.state_slot(moving.position))[0] = position;
+            memory.slot_mut(self.model.state_slot(moving.velocity))[0] = 0.0;
+        }
         self.model.rates.run(memory);
         let effort = self.inertia[lane] * self.model.rates.output(memory, moving.velocity)[0];
         self.alone.set(alone);

@@ -1,5 +1,7 @@
 //! What the samples of a recording say by themselves: how its first channel moves, and how finely it was read.
 
+use nalgebra::{Matrix3, Vector3};
+
 use crate::sim2real::{Measured, Recording, Typical};
 
 /// Value and rate of a channel at one row, as measured.
@@ -20,19 +22,30 @@ const REACH: usize = 7;
 pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row: usize) -> Option<Estimate> {
     let samples = &recording.channel(channel)?.samples;
     let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(recording.len());
-    let points: Vec<(f64, f64)> =
-        rows.filter_map(|i| Some((recording.time[i] - recording.time[row], samples[i]?))).collect();
+    // Asked for at every row: without room of its own for each.
+    let mut points = [(0.0, 0.0); 2 * REACH + 1];
+    let mut count = 0;
+    for (time, y) in rows.filter_map(|i| Some((recording.time[i] - recording.time[row], samples[i]?))) {
+        points[count] = (time, y);
+        count += 1;
+    }
+    let points = &points[..count];
     let scale = points.iter().map(|(t, _)| t.abs()).fold(0.0, f64::max);
     if points.len() < 5 || scale <= 0.0 {
         let (_, value) = points.first()?;
         return Some(Estimate { value: *value, rate: 0.0, rate_std: f64::INFINITY });
     }
-    let design = nalgebra::DMatrix::from_fn(points.len(), 3, |i, k| (points[i].0 / scale).powi(k as i32));
-    let values = nalgebra::DVector::from_iterator(points.len(), points.iter().map(|(_, y)| *y));
-    let inverse = design.tr_mul(&design).try_inverse()?;
-    let solution = &inverse * design.tr_mul(&values);
+    let powers = |t: f64| Vector3::new(1.0, t / scale, (t / scale).powi(2));
+    let (mut information, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (t, y) in points {
+        let row = powers(*t);
+        information += row * row.transpose();
+        right += row * *y;
+    }
+    let inverse = information.try_inverse()?;
+    let solution = inverse * right;
     let spare = (points.len() - 3) as f64;
-    let variance = (&values - &design * &solution).norm_squared() / spare;
+    let variance = points.iter().map(|(t, y)| (y - powers(*t).dot(&solution)).powi(2)).sum::<f64>() / spare;
     let measured = recording.channel(rate).and_then(|v| v.samples[row]);
     Some(Estimate {
         value: solution[0],

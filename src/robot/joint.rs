@@ -3,6 +3,7 @@
 use super::estimate::{local, motion, rounding, typical};
 use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
+use super::sine::{sine, sines};
 use crate::sim2real::{
     Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
 };
@@ -184,12 +185,13 @@ impl Plant for Joint {
     }
 
     fn dynamics(&self, thetas: &Thetas) -> JointDynamics {
-        JointDynamics {
-            inertia: thetas.row(0).to_vec(),
-            viscous_friction: thetas.row(1).to_vec(),
-            gravity_torque: thetas.row(2).to_vec(),
-            gain: thetas.row(3).to_vec(),
-        }
+        let lane = |k: usize| Lane {
+            inertia: thetas.row(0)[k],
+            viscous_friction: thetas.row(1)[k],
+            gravity_torque: thetas.row(2)[k],
+            gain: thetas.row(3)[k],
+        };
+        JointDynamics { lanes: (0..thetas.lanes()).map(lane).collect() }
     }
 }
 
@@ -203,30 +205,72 @@ impl Mover for Joint {
     }
 
     fn inertia(dynamics: &JointDynamics, lane: usize, _: &Motion) -> f64 {
-        dynamics.inertia[lane]
+        dynamics.lanes[lane].inertia
     }
 
     fn drive(dynamics: &JointDynamics, lane: usize, _: &Motion, command: &Signal) -> f64 {
-        dynamics.gain[lane] * command.0
+        dynamics.lanes[lane].gain * command.0
     }
 
     fn external(dynamics: &JointDynamics, lane: usize, _: &Motion, position: f64) -> f64 {
-        let gravity = dynamics.gravity_torque[lane];
-        if gravity == 0.0 { 0.0 } else { -gravity * position.sin() }
+        let gravity = dynamics.lanes[lane].gravity_torque;
+        if gravity == 0.0 { 0.0 } else { -gravity * sine(position) }
     }
 
     fn damping(dynamics: &JointDynamics, lane: usize, _: &Motion) -> f64 {
-        dynamics.viscous_friction[lane]
+        dynamics.lanes[lane].viscous_friction
     }
 }
 
 /// The running joint: its parameters, lane by lane.
 #[derive(Debug, Clone)]
 pub struct JointDynamics {
-    inertia: Vec<f64>,
-    viscous_friction: Vec<f64>,
-    gravity_torque: Vec<f64>,
-    gain: Vec<f64>,
+    lanes: Vec<Lane>,
+}
+
+/// The parameters of one lane.
+#[derive(Debug, Clone, Copy)]
+struct Lane {
+    inertia: f64,
+    viscous_friction: f64,
+    gravity_torque: f64,
+    gain: f64,
+}
+
+/// Lanes whose sines are taken at once.
+const BLOCK: usize = 8;
+
+impl Lane {
+    /// One step of `step` [s]; `sine` is that of the position in the middle of it.
+    #[inline(always)]
+    fn step(&self, step: f64, state: &mut Motion, sine: f64, command: f64, effect: &Push) {
+        let half = 0.5 * step;
+        let viscous = self.viscous_friction;
+        let inertia = self.inertia + effect.inertia;
+        let midway = state.position + half * state.velocity;
+        let mut torque = self.gain * command + effect.effort - effect.stiffness * midway;
+        if self.gravity_torque != 0.0 {
+            torque -= self.gravity_torque * sine;
+        }
+        if effect.creeping_friction > 0.0 {
+            let driven = |velocity: f64| torque - viscous * velocity;
+            let stopping = |velocity: f64| {
+                let whole = CREEP_SHARE * (inertia * CREEP_RATE * velocity + driven(velocity));
+                whole.max(-effect.creeping_friction).min(effect.creeping_friction)
+            };
+            // As of the middle of the step: creep is fast for a step.
+            let change = (driven(state.velocity) - stopping(state.velocity)) / inertia;
+            torque -= stopping(state.velocity + half * change);
+        }
+        // Damping by Crank-Nicolson, on both sides of the step.
+        let damping = half * (viscous + effect.damping);
+        let whole = inertia + damping;
+        let free = (state.velocity * (inertia - damping) + step * torque) / whole;
+        let held = if effect.dry_friction > 0.0 { step * effect.dry_friction / whole } else { 0.0 };
+        let velocity = if held > 0.0 { rubbed(state.velocity, free, held) } else { free };
+        state.position = midway + half * velocity;
+        state.velocity = velocity;
+    }
 }
 
 impl Dynamics<Joint> for JointDynamics {
@@ -237,32 +281,22 @@ impl Dynamics<Joint> for JointDynamics {
 
     fn advance(&self, tick: Tick, states: &mut [Motion], _: &[()], commands: &[Signal], effects: &[Push]) {
         let half = 0.5 * tick.step;
-        let parameters = self.inertia.iter().zip(&self.viscous_friction).zip(&self.gravity_torque).zip(&self.gain);
-        let lanes = states.iter_mut().zip(commands).zip(effects).zip(parameters);
-        for (((state, command), effect), (((inertia, viscous), gravity), gain)) in lanes {
-            let inertia = inertia + effect.inertia;
-            let midway = state.position + half * state.velocity;
-            let mut torque = gain * command.0 + effect.effort - effect.stiffness * midway;
-            // The sine is most of the work of a step: not where nothing weighs on the joint.
-            if *gravity != 0.0 {
-                torque -= gravity * midway.sin();
+        for first in (0..states.len()).step_by(BLOCK) {
+            let own = first..(first + BLOCK).min(states.len());
+            let (states, parameters) = (&mut states[own.clone()], &self.lanes[own.clone()]);
+            let mut sine = [0.0; BLOCK];
+            // The sine is most of the work of a step: of several lanes at once, and not where nothing weighs on the joint.
+            if parameters.iter().any(|lane| lane.gravity_torque != 0.0) {
+                let sine = &mut sine[..states.len()];
+                sine.iter_mut()
+                    .zip(states.iter())
+                    .for_each(|(angle, state)| *angle = state.position + half * state.velocity);
+                sines(sine);
             }
-            if effect.creeping_friction > 0.0 {
-                let driven = |velocity: f64| torque - viscous * velocity;
-                let stopping = |velocity: f64| {
-                    let whole = CREEP_SHARE * (inertia * CREEP_RATE * velocity + driven(velocity));
-                    whole.max(-effect.creeping_friction).min(effect.creeping_friction)
-                };
-                // As of the middle of the step: creep is fast for a step.
-                let change = (driven(state.velocity) - stopping(state.velocity)) / inertia;
-                torque -= stopping(state.velocity + half * change);
+            let lanes = states.iter_mut().zip(parameters).zip(&commands[own.clone()]).zip(&effects[own]).zip(sine);
+            for ((((state, lane), command), effect), sine) in lanes {
+                lane.step(tick.step, state, sine, command.0, effect);
             }
-            let damping = half * (viscous + effect.damping) / inertia;
-            let free = (state.velocity * (1.0 - damping) + tick.step * torque / inertia) / (1.0 + damping);
-            let held = tick.step * effect.dry_friction / (inertia * (1.0 + damping));
-            let velocity = if held > 0.0 { rubbed(state.velocity, free, held) } else { free };
-            state.position = midway + half * velocity;
-            state.velocity = velocity;
         }
     }
 

@@ -8,6 +8,7 @@ pub mod mechanism;
 mod mover;
 mod runge_kutta;
 mod signal;
+mod sine;
 mod tanks;
 #[cfg(feature = "io")]
 mod twin;

@@ -400,7 +400,7 @@ impl<P: Plant> Assembly<P> {
             Clock::Event => self.follow_events(&mut run, recording, rows, &mut out),
             Clock::Sampled { .. } => self.follow_samples(&mut run, recording, rows, &mut out),
         }
-        out.trajectories
+        out.trajectories()
     }
 
     /// Rows are samples: the observation of a row is taken before its command acts.
@@ -459,9 +459,15 @@ fn between(measured: &Measured, row: usize, along: f64) -> Option<f64> {
     Some(from + along * (to - from))
 }
 
+/// Rows that are collected before each channel of each lane is given its own: as many as stay near the processor.
+const COLLECTED: usize = 64;
+
 /// Collects observations, lane by lane and channel by channel.
 struct Follow {
     trajectories: Vec<Trajectory>,
+    /// Room for rows that are not yet in the trajectories, each with all channels of the first lane, then of the second.
+    collected: Vec<f64>,
+    channels: usize,
     /// Rows after which all lanes go on from the state of the first, if ever.
     every: Option<usize>,
     rows: usize,
@@ -474,19 +480,42 @@ impl Follow {
         // A clone of an empty vector has no capacity: reserve in each lane.
         let mut trajectories = vec![one; lanes];
         trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
-        Self { trajectories, every, rows: 0 }
+        let collected = vec![0.0; COLLECTED.min(rows) * lanes * channels.len()];
+        Self { trajectories, collected, channels: channels.len(), every, rows: 0 }
+    }
+
+    /// Numbers in a row of all lanes.
+    fn width(&self) -> usize {
+        self.trajectories.len() * self.channels
     }
 
     fn record<P: Plant>(&mut self, run: &mut Run<P>, time: f64) {
-        for (trajectory, observation) in self.trajectories.iter_mut().zip(run.observe(time)) {
-            for (k, simulated) in trajectory.iter_mut().enumerate() {
-                simulated.samples.push(observation.channel(k));
-            }
+        let width = self.width();
+        let row = &mut self.collected[(self.rows % COLLECTED) * width..][..width];
+        for (values, observation) in row.chunks_exact_mut(self.channels.max(1)).zip(run.observe(time)) {
+            values.iter_mut().enumerate().for_each(|(k, value)| *value = observation.channel(k));
         }
         if self.every.is_some_and(|every| self.rows.is_multiple_of(every)) {
             run.rejoin();
         }
         self.rows += 1;
+        if self.rows.is_multiple_of(COLLECTED) {
+            self.sort(COLLECTED);
+        }
+    }
+
+    /// Gives each channel of each lane what was collected of it in the last `rows` rows.
+    fn sort(&mut self, rows: usize) {
+        let width = self.width();
+        for (at, simulated) in self.trajectories.iter_mut().flatten().enumerate() {
+            simulated.samples.extend(self.collected[..rows * width].chunks_exact(width).map(|row| row[at]));
+        }
+    }
+
+    /// All that was collected.
+    fn trajectories(mut self) -> Vec<Trajectory> {
+        self.sort(self.rows % COLLECTED);
+        self.trajectories
     }
 }
 

@@ -24,6 +24,7 @@ impl Clock {
     #[must_use]
     pub fn substeps(self, seconds: f64) -> usize {
         match self {
+            Self::Sampled { longest_step } if seconds <= longest_step => 1,
             // The small allowance keeps a row of exactly one step, up to rounding, from being cut in two.
             Self::Sampled { longest_step } => ((seconds / longest_step - 1e-6).ceil() as usize).max(1),
             Self::Event => 1,

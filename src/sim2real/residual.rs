@@ -18,10 +18,12 @@ pub(crate) fn residuals_into<S>(part: &Part<'_, S>, simulated: &[Simulated], wei
         let Some(measured) = part.recording.channel(&weight.channel) else { continue };
         let Some(simulated) = simulated.iter().find(|s| s.channel == weight.channel) else { continue };
         let inverse = 1.0 / weight.noise;
-        out.extend(
-            part.rows
-                .clone()
-                .filter_map(|row| Some((measured.samples[row]? - simulated.samples[row - part.start]) * inverse)),
-        );
+        let simulated = &simulated.samples[part.rows.start - part.start..];
+        out.reserve(part.rows.len());
+        for (measured, simulated) in measured.samples[part.rows.clone()].iter().zip(simulated) {
+            if let Some(measured) = measured {
+                out.push((measured - simulated) * inverse);
+            }
+        }
     }
 }

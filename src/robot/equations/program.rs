@@ -75,7 +75,8 @@ impl Program {
 
     /// Memory for `lanes` lanes, in which the fixed names have the values of `fixed`, a row a name.
     pub fn memory<'a>(&self, lanes: usize, fixed: impl IntoIterator<Item = &'a [f64]>) -> Memory {
-        let mut memory = Memory { lanes, values: vec![0.0; self.slots * lanes] };
+        let width = if lanes == 1 { 1 } else { lanes.next_multiple_of(BLOCK) };
+        let mut memory = Memory { lanes, width, values: vec![0.0; self.slots * width] };
         for (slot, values) in fixed.into_iter().enumerate() {
             memory.slot_mut(slot).copy_from_slice(values);
         }
@@ -88,7 +89,11 @@ impl Program {
 
     /// Computes the expressions from what stands in the slots of the varying names.
     pub fn run(&self, memory: &mut Memory) {
-        self.each.iter().for_each(|instruction| memory.execute(*instruction));
+        if memory.width == 1 {
+            self.each.iter().for_each(|instruction| memory.execute_alone(*instruction));
+        } else {
+            self.each.iter().for_each(|instruction| memory.execute(*instruction));
+        }
     }
 
     /// The value of expression `k`, one a lane.
@@ -97,47 +102,83 @@ impl Program {
     }
 }
 
+/// Lanes that an instruction takes at once.
+const BLOCK: usize = 4;
+
 /// The slots of a program over lanes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Memory {
     lanes: usize,
+    /// Numbers a slot holds: whole blocks of lanes, of which the last may be idle.
+    width: usize,
     values: Vec<f64>,
 }
 
 impl Memory {
     /// The values of a slot, one a lane.
     pub fn slot(&self, slot: usize) -> &[f64] {
-        &self.values[slot * self.lanes..(slot + 1) * self.lanes]
+        &self.values[slot * self.width..][..self.lanes]
     }
 
     /// As [`slot`](Self::slot), to be written.
     pub fn slot_mut(&mut self, slot: usize) -> &mut [f64] {
-        &mut self.values[slot * self.lanes..(slot + 1) * self.lanes]
+        &mut self.values[slot * self.width..][..self.lanes]
+    }
+
+    /// As [`execute`](Self::execute) does it for a single lane, without the room of a block.
+    fn execute_alone(&mut self, Instruction { op, left, right, to }: Instruction) {
+        let (left, right) = (self.values[left], self.values[right]);
+        self.values[to] = match op {
+            Op::Add => left + right,
+            Op::Subtract => left - right,
+            Op::Multiply => left * right,
+            Op::Divide => left / right,
+            Op::Negate => -left,
+            Op::Power => left.powf(right),
+            Op::Of(function) => FUNCTIONS[function].1(left),
+            Op::OfTwo(function) => FUNCTIONS_OF_TWO[function].1(left, right),
+        };
     }
 
     fn execute(&mut self, Instruction { op, left, right, to }: Instruction) {
-        let lanes = self.lanes;
-        let (before, from) = self.values.split_at_mut(to * lanes);
-        let result = &mut from[..lanes];
-        let (left, right) = (&before[left * lanes..][..lanes], &before[right * lanes..][..lanes]);
-        let operands = result.iter_mut().zip(left.iter().zip(right));
+        let width = self.width;
+        let (before, from) = self.values.split_at_mut(to * width);
+        let result = &mut from[..width];
+        let (left, right) = (&before[left * width..][..width], &before[right * width..][..width]);
         match op {
-            Op::Add => operands.for_each(|(to, (a, b))| *to = a + b),
-            Op::Subtract => operands.for_each(|(to, (a, b))| *to = a - b),
-            Op::Multiply => operands.for_each(|(to, (a, b))| *to = a * b),
-            Op::Divide => operands.for_each(|(to, (a, b))| *to = a / b),
-            Op::Negate => operands.for_each(|(to, (a, _))| *to = -a),
-            Op::Power => operands.for_each(|(to, (a, b))| *to = a.powf(*b)),
+            Op::Add => in_blocks(result, left, right, |a, b| a + b),
+            Op::Subtract => in_blocks(result, left, right, |a, b| a - b),
+            Op::Multiply => in_blocks(result, left, right, |a, b| a * b),
+            Op::Divide => in_blocks(result, left, right, |a, b| a / b),
+            Op::Negate => in_blocks(result, left, right, |a, _| -a),
+            // Functions are called lane by lane: not for idle ones.
+            Op::Power => lane_by_lane(&mut result[..self.lanes], left, right, f64::powf),
             Op::Of(function) => {
                 let function = FUNCTIONS[function].1;
-                operands.for_each(|(to, (a, _))| *to = function(*a));
+                lane_by_lane(&mut result[..self.lanes], left, right, |a, _| function(a));
             }
             Op::OfTwo(function) => {
-                let function = FUNCTIONS_OF_TWO[function].1;
-                operands.for_each(|(to, (a, b))| *to = function(*a, *b));
+                lane_by_lane(&mut result[..self.lanes], left, right, FUNCTIONS_OF_TWO[function].1);
             }
         }
     }
+}
+
+#[inline]
+fn in_blocks(result: &mut [f64], left: &[f64], right: &[f64], function: impl Fn(f64, f64) -> f64) {
+    if let ([result], [left], [right]) = (&mut *result, left, right) {
+        *result = function(*left, *right);
+        return;
+    }
+    let operands = left.as_chunks::<BLOCK>().0.iter().zip(right.as_chunks::<BLOCK>().0);
+    for (result, (left, right)) in result.as_chunks_mut::<BLOCK>().0.iter_mut().zip(operands) {
+        *result = std::array::from_fn(|k| function(left[k], right[k]));
+    }
+}
+
+#[inline]
+fn lane_by_lane(result: &mut [f64], left: &[f64], right: &[f64], function: impl Fn(f64, f64) -> f64) {
+    result.iter_mut().zip(left.iter().zip(right)).for_each(|(result, (left, right))| *result = function(*left, *right));
 }
 
 impl Builder<'_> {

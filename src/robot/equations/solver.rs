@@ -22,6 +22,8 @@ pub(super) struct Work {
     length: Vec<f64>,
     left: Vec<f64>,
     contact: Vec<Contact>,
+    /// Whether mechanisms push any lane in this tick.
+    pushed: bool,
 }
 
 /// What acts during a step.
@@ -57,6 +59,7 @@ impl Work {
             length: vec![0.0; lanes],
             left: vec![0.0; lanes],
             contact: vec![Contact::Sliding(0.0); lanes],
+            pushed: false,
         }
     }
 
@@ -66,6 +69,7 @@ impl Work {
             state.iter().enumerate().for_each(|(k, value)| self.base[k * self.lanes + i] = *value);
         }
         let model = acting.model;
+        self.pushed = acting.effects.iter().any(|push| *push != Push::default());
         for (i, command) in acting.commands.iter().enumerate() {
             self.memory.slot_mut(model.input_slot(0))[i] = command.0;
         }
@@ -138,7 +142,7 @@ impl Work {
 
     /// Adds what mechanisms push with, lane by lane; a lane that nothing pushes keeps its bits.
     fn push(&mut self, acting: &Acting<'_>) {
-        let Some(moving) = &acting.model.moving else { return };
+        let Some(moving) = acting.model.moving.as_ref().filter(|_| self.pushed) else { return };
         for (i, push) in acting.effects.iter().enumerate() {
             if *push == Push::default() {
                 continue;

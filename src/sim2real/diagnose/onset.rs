@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::gates;
 use super::hypothesis::{Hypothesis, Inquiry, free_parameters};
 use super::select::ACCEPT;
 use super::whiteness::autocorrelation_time;
@@ -203,6 +204,9 @@ const TRIED: usize = 3;
 ///
 /// Scores of a run that passes through the change miss that the motion before it goes on for a while after it.
 fn refined<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, whole: &Part<'_, T::Stimulus>, first: f64) -> f64 {
+    // Steps as long as those in which hypotheses are compared tell a date as well as the shorter ones of the twin.
+    let step = gates::exploring_step(inquiry.twin, &hypothesis.fit.values, inquiry.evidence);
+    let twin = step.map_or_else(|| hypothesis.twin.clone(), |step| hypothesis.twin.stepping(step));
     let time = &whole.recording.time;
     let (start, end) = (time[whole.rows.start], time[whole.rows.end - 1]);
     let free: Vec<usize> =
@@ -211,12 +215,7 @@ fn refined<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, whole:
         let row = time.partition_point(|t| *t < at).clamp(whole.rows.start + 2, whole.rows.end - 2);
         let one = |start: usize, end: usize| {
             let part = [Part { recording: whole.recording, start, rows: start..end }];
-            let problem = Problem {
-                simulator: &hypothesis.twin,
-                parts: &part,
-                weights: &inquiry.evidence.weights,
-                seed: inquiry.seed,
-            };
+            let problem = Problem { simulator: &twin, parts: &part, weights: &inquiry.evidence.weights, seed: inquiry.seed };
             let fit = fit_smooth(&problem, &hypothesis.fit.values, &free, &State::unknown(&problem));
             fit.residual.norm_squared() + fit.prior
         };

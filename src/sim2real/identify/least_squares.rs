@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::problem::{DIFFERENCE, Evaluation, Problem, State};
+use super::problem::{DIFFERENCE, Evaluation, Problem, Runs, State};
 use crate::sim2real::Simulator;
 
 /// Directions in which the data move the parameters less than this part of the strongest count as not determined:
@@ -141,20 +141,21 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let parameters = problem.simulator.parameters();
         let theta: Vec<f64> = start.iter().zip(parameters).map(|(value, p)| value.clamp(p.lower, p.upper)).collect();
         let state = state.clone();
-        let evaluation = problem.evaluate(&theta, &state, free);
+        let runs = problem.followed(&theta, &state, free);
+        let evaluation = problem.projected(&runs, &state);
         let mut descent = Self { problem, free, theta, state, evaluation, objective: 0.0, damping: DAMPING, ended: false };
-        descent.temper();
+        descent.temper(&runs);
         descent
     }
 
-    /// Holds the priors of initial states against the misfit as it is now.
-    fn temper(&mut self) {
+    /// Holds the priors of initial states against the misfit as it is now; `runs` are those at `theta` and `state`.
+    fn temper(&mut self, runs: &Runs) {
         let rows = self.evaluation.measured.max(1) as f64;
         let misfit = (self.evaluation.residual.rows(0, self.evaluation.measured).norm_squared() / rows).sqrt().max(1.0);
         // Within a tenth nothing is gained by changing what is being minimized.
         if (misfit / self.state.misfit).ln().abs() > 0.1 {
             self.state.misfit = misfit;
-            self.evaluation = self.problem.evaluate(&self.theta, &self.state, self.free);
+            self.evaluation = self.problem.projected(runs, &self.state);
         }
         self.objective = self.evaluation.objective + self.prior(&self.theta);
     }
@@ -198,8 +199,9 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
                 let matters = value < self.objective * (1.0 - 0.1 * CONVERGED);
                 (self.theta, self.state) = (theta, state);
                 self.damping = (self.damping * SPREAD[k]).max(1e-9);
-                self.evaluation = self.problem.evaluate(&self.theta, &self.state, self.free);
-                self.temper();
+                let runs = self.problem.followed(&self.theta, &self.state, self.free);
+                self.evaluation = self.problem.projected(&runs, &self.state);
+                self.temper(&runs);
                 self.ended |= !matters;
                 return;
             }

@@ -15,6 +15,9 @@ pub(super) const DIFFERENCE: f64 = 1e-4;
 /// What a residual that is not a number is taken for: worse than any other, and finite.
 const DIVERGED: f64 = 1e15;
 
+/// Most lanes of one run.
+const LANES: usize = 16;
+
 /// A simulator beside what it should explain.
 ///
 /// The states from which parts start are no parameters of the fit: at each evaluation they are solved for, to first
@@ -63,6 +66,16 @@ pub struct Evaluation {
     pub objective: f64,
 }
 
+/// One part followed: residuals and their derivatives, before what initial states explain is taken out.
+struct Followed {
+    residual: DVector<f64>,
+    derivatives: Vec<DVector<f64>>,
+    by_initial: Vec<DVector<f64>>,
+}
+
+/// All parts followed.
+pub(super) struct Runs(Vec<Followed>);
+
 /// One part evaluated: residuals, and one column a perturbed parameter.
 struct Piece {
     residual: DVector<f64>,
@@ -102,17 +115,26 @@ impl<S: Simulator> Problem<'_, S> {
     /// The parts start from `state`, to first order moved to where they are best started from.
     #[must_use]
     pub fn evaluate(&self, theta: &[f64], state: &State, free: &[usize]) -> Evaluation {
-        let pieces: Vec<Piece> = self
-            .parts
-            .par_iter()
-            .enumerate()
-            .map(|(number, part)| self.piece(part, theta, &state.initial[number], &state.values[number], state.misfit, free))
-            .collect();
-        self.assemble(&pieces, free.len())
+        self.projected(&self.followed(theta, state, free), state)
+    }
+
+    /// Follows all parts, and their derivatives by the parameters numbered in `free` and by initial states.
+    pub(super) fn followed(&self, theta: &[f64], state: &State, free: &[usize]) -> Runs {
+        let parts = self.parts.par_iter().zip(&state.initial).zip(&state.values);
+        Runs(parts.map(|((part, initial), start)| self.follow(part, theta, initial, start, free)).collect())
+    }
+
+    /// What is left of `runs` once the initial states of `state`, from which they were followed, are moved to where they fit
+    /// best: another misfit weighs their priors anew, and needs no other runs.
+    pub(super) fn projected(&self, runs: &Runs, state: &State) -> Evaluation {
+        let parts = runs.0.par_iter().zip(&state.initial).zip(&state.values);
+        let pieces: Vec<Piece> = parts.map(|((run, initial), start)| project(run, initial, start, state.misfit)).collect();
+        self.assemble(&pieces)
     }
 
     /// Lays the pieces one after the other: all measured residuals first, then all prior rows.
-    fn assemble(&self, pieces: &[Piece], columns: usize) -> Evaluation {
+    fn assemble(&self, pieces: &[Piece]) -> Evaluation {
+        let columns = pieces.first().map_or(0, |p| p.jacobian.ncols());
         let measured: Vec<usize> = pieces.iter().map(|p| p.residual.len() - p.initial_step.len()).collect();
         let total: usize = pieces.iter().map(|p| p.residual.len()).sum();
         let mut residual = DVector::zeros(total);
@@ -151,10 +173,10 @@ impl<S: Simulator> Problem<'_, S> {
         let of_part = |(number, part): (usize, &Part<'_, S::Stimulus>)| -> Vec<DVector<f64>> {
             let lanes: Vec<Vec<f64>> =
                 thetas.iter().map(|theta| theta.iter().chain(&state.values[number]).copied().collect()).collect();
-            let runs = self.simulator.rollout(&Thetas::from_lanes(&lanes), part.recording, part.followed(), self.seed);
-            runs.iter()
-                .map(|run| {
-                    let residual = self.residual(part, run);
+            let followed = self.followed_by(part, &lanes);
+            followed
+                .into_iter()
+                .map(|residual| {
                     // The priors' rows of the basis meet zeros: only its measured rows count.
                     let known = basis[number].rows(0, residual.len());
                     let explained = known * known.tr_mul(&residual);
@@ -178,26 +200,25 @@ impl<S: Simulator> Problem<'_, S> {
         let of_part = |(number, part): (usize, &Part<'_, S::Stimulus>)| -> Vec<f64> {
             let lanes: Vec<Vec<f64>> =
                 points.iter().map(|(theta, state)| theta.iter().chain(&state.values[number]).copied().collect()).collect();
-            let runs = self.simulator.rollout(&Thetas::from_lanes(&lanes), part.recording, part.followed(), self.seed);
             let prior = |state: &State| -> f64 {
                 let (initial, values) = (&state.initial[number], &state.values[number]);
                 initial.iter().zip(values).map(|(p, v)| (weight(p, state.misfit) * (v - p.nominal)).powi(2)).sum()
             };
-            runs.iter().zip(points).map(|(run, (_, state))| self.residual(part, run).norm_squared() + prior(state)).collect()
+            let followed = self.followed_by(part, &lanes);
+            followed.iter().zip(points).map(|(residual, (_, state))| residual.norm_squared() + prior(state)).collect()
         };
         let parts: Vec<Vec<f64>> = self.parts.par_iter().enumerate().map(of_part).collect();
         (0..points.len()).map(|k| parts.iter().map(|values| values[k]).sum()).collect()
     }
 
-    fn piece(
+    fn follow(
         &self,
         part: &Part<'_, S::Stimulus>,
         theta: &[f64],
         initial: &[Parameter],
         start: &[f64],
-        misfit: f64,
         free: &[usize],
-    ) -> Piece {
+    ) -> Followed {
         let parameters = self.simulator.parameters();
         let steps: Vec<(usize, f64)> = free
             .iter()
@@ -211,11 +232,23 @@ impl<S: Simulator> Problem<'_, S> {
             lane[*k] += step;
             lanes.push(lane);
         }
-        let trajectories = self.simulator.rollout(&Thetas::from_lanes(&lanes), part.recording, part.followed(), self.seed);
-        let columns: Vec<DVector<f64>> = trajectories.iter().map(|t| self.residual(part, t)).collect();
-        let derivatives: Vec<DVector<f64>> =
-            columns[1..].iter().zip(&steps).map(|(moved, (_, step))| (moved - &columns[0]) / *step).collect();
-        project(&columns[0], &derivatives[..free.len()], &derivatives[free.len()..], initial, start, misfit)
+        let mut columns = self.followed_by(part, &lanes).into_iter();
+        let residual = columns.next().unwrap_or_else(|| DVector::zeros(0));
+        let mut derivatives: Vec<DVector<f64>> =
+            columns.zip(&steps).map(|(moved, (_, step))| (moved - &residual) / *step).collect();
+        let by_initial = derivatives.split_off(free.len());
+        Followed { residual, derivatives, by_initial }
+    }
+
+    /// The residuals of `part` in each of `lanes`, some lanes at a time: they take room, and more gain no speed.
+    fn followed_by(&self, part: &Part<'_, S::Stimulus>, lanes: &[Vec<f64>]) -> Vec<DVector<f64>> {
+        let mut residuals = Vec::with_capacity(lanes.len());
+        let runs = lanes.len().div_ceil(LANES).max(1);
+        for some in lanes.chunks(lanes.len().div_ceil(runs).max(1)) {
+            let runs = self.simulator.rollout(&Thetas::from_lanes(some), part.recording, part.followed(), self.seed);
+            residuals.extend(runs.iter().map(|run| self.residual(part, run)));
+        }
+        residuals
     }
 
     fn residual(&self, part: &Part<'_, S::Stimulus>, trajectory: &[crate::sim2real::Simulated]) -> DVector<f64> {
@@ -275,55 +308,37 @@ fn weight(parameter: &Parameter, misfit: f64) -> f64 {
 ///
 /// With `A = [J_i; W]`, where `W` holds the priors' weights, the best step of the initial state leaves
 /// `b - Q Q' b` of `b = [r; W d]`, and likewise of every column of the Jacobian.
-fn project(
-    residual: &DVector<f64>,
-    derivatives: &[DVector<f64>],
-    by_initial: &[DVector<f64>],
-    initial: &[Parameter],
-    start: &[f64],
-    misfit: f64,
-) -> Piece {
+fn project(run: &Followed, initial: &[Parameter], start: &[f64], misfit: f64) -> Piece {
+    let Followed { residual, derivatives, by_initial } = run;
     let (rows, count) = (residual.len(), initial.len());
     let weight: Vec<f64> = initial.iter().map(|p| weight(p, misfit)).collect();
-    let extended = |top: &DVector<f64>, bottom: &dyn Fn(usize) -> f64| {
-        DVector::from_fn(rows + count, |i, _| if i < rows { top[i] } else { bottom(i - rows) })
-    };
-    let b = extended(residual, &|k| weight[k] * (start[k] - initial[k].nominal));
-    let columns: Vec<DVector<f64>> = derivatives.iter().map(|d| extended(d, &|_| 0.0)).collect();
-    let jacobian = |columns: &[DVector<f64>]| {
-        if columns.is_empty() { DMatrix::zeros(rows + count, 0) } else { DMatrix::from_columns(columns) }
-    };
-    if count == 0 {
-        let objective = b.norm_squared();
-        let initial_by_parameter = DMatrix::zeros(0, columns.len());
-        return Piece {
-            residual: b,
-            jacobian: jacobian(&columns),
-            initial_step: Vec::new(),
-            initial_by_parameter,
-            initial_basis: DMatrix::zeros(rows, 0),
-            objective,
-        };
+    let mut b = residual.clone().resize_vertically(rows + count, 0.0);
+    for k in 0..count {
+        b[rows + k] = weight[k] * (start[k] - initial[k].nominal);
     }
-    let a: Vec<DVector<f64>> =
-        by_initial.iter().enumerate().map(|(k, d)| extended(d, &|i| if i == k { weight[k] } else { 0.0 })).collect();
-    let qr = DMatrix::from_columns(&a).qr();
-    let (q, r) = (qr.q(), qr.r());
-    let without = |v: &DVector<f64>| v - &q * q.tr_mul(v);
-    let step = r.solve_upper_triangular(&(-q.tr_mul(&b))).unwrap_or_else(|| DVector::zeros(count));
-    let along = |v: &DVector<f64>| r.solve_upper_triangular(&q.tr_mul(v)).unwrap_or_else(|| DVector::zeros(count));
-    let initial_by_parameter = DMatrix::from_fn(count, columns.len(), |_, _| 0.0);
-    let initial_by_parameter = columns.iter().enumerate().fold(initial_by_parameter, |mut all, (k, column)| {
-        all.set_column(k, &along(column));
+    let objective = b.norm_squared();
+    let below = |columns: &[DVector<f64>]| {
+        let mut all = DMatrix::zeros(rows + count, columns.len());
+        all.column_iter_mut().zip(columns).for_each(|(mut to, from)| to.rows_mut(0, rows).copy_from(from));
         all
-    });
-    let columns: Vec<DVector<f64>> = columns.iter().map(without).collect();
-    Piece {
-        residual: without(&b),
-        jacobian: jacobian(&columns),
-        initial_step: step.iter().copied().collect(),
-        initial_by_parameter,
-        objective: b.norm_squared(),
-        initial_basis: q,
+    };
+    let mut jacobian = below(derivatives);
+    if count == 0 {
+        let initial_by_parameter = DMatrix::zeros(0, derivatives.len());
+        let initial_basis = DMatrix::zeros(rows, 0);
+        return Piece { residual: b, jacobian, initial_step: Vec::new(), initial_by_parameter, initial_basis, objective };
     }
+    let mut a = below(by_initial);
+    (0..count).for_each(|k| a[(rows + k, k)] = weight[k]);
+    let qr = a.qr();
+    let (q, r) = (qr.q(), qr.r());
+    let solved =
+        |along: &DMatrix<f64>| r.solve_upper_triangular(along).unwrap_or_else(|| DMatrix::zeros(count, along.ncols()));
+    let along = DMatrix::from_columns(&[q.tr_mul(&b)]);
+    let initial_step = (-solved(&along)).iter().copied().collect();
+    b.gemv(-1.0, &q, &along.column(0), 1.0);
+    let along = q.tr_mul(&jacobian);
+    let initial_by_parameter = solved(&along);
+    jacobian.gemm(-1.0, &q, &along, 1.0);
+    Piece { residual: b, jacobian, initial_step, initial_by_parameter, objective, initial_basis: q }
 }
