@@ -103,6 +103,12 @@ impl OutputTable {
         self
     }
 
+    /// Its columns: names and values.
+    #[must_use]
+    pub fn columns(&self) -> &[(String, Values)] {
+        &self.columns
+    }
+
     /// The table as the bytes of a file of that name: CSV or Parquet, by its ending.
     ///
     /// # Errors
