@@ -25,6 +25,6 @@ pub fn target(_: &Scene, bytes: &[u8]) {
     let attach = Some(Attachment { position: "x".into(), velocity: "v".into(), inertia: output });
     shown(Equations::new(EquationSystem { attach, ..system.clone() }, 1e-3));
     if let Some(equations) = shown(Equations::new(system, 1e-3)) {
-        equations.not_finite_at_start(&[1.0]);
+        let _ = equations.not_finite_at_start(&[1.0]);
     }
 }

@@ -22,7 +22,7 @@ pub fn every_column(scene: &Scene, table: &Table) {
         }
         if let Some(times) = shown(table.times(name, &TimeFormat::default())) {
             shown(check_increasing(table, name, &times, Increase::Strictly));
-            common_spacing(&times);
+            let _ = common_spacing(&times);
         }
         let local = TimeFormat { unit: TimeUnit::Seconds, zone: "America/New_York".parse().expect("a zone") };
         let columns = [

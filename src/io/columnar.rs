@@ -1,9 +1,10 @@
 //! Parquet and Arrow files; the only place, with [`write`](super::write), that knows the data-frame library.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::Arc;
 
 use chrono::{DateTime, NaiveDateTime};
 use polars::prelude::{
@@ -11,6 +12,7 @@ use polars::prelude::{
     TimeZone, polars_ensure,
 };
 
+use super::arrow_buffers::buffers_agree;
 use super::error::InputError;
 use super::parquet_pages::pages_agree;
 
@@ -96,12 +98,19 @@ fn first_line(text: &str) -> String {
 }
 
 fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
-    let (size, again) = (file.metadata()?.len(), file.try_clone()?);
+    let (size, mut again) = (file.metadata()?.len(), file.try_clone()?);
     let mut parquet = None;
     let mut arrow = None;
     let schema = match container {
         Container::Parquet => parquet.insert(ParquetReader::new(file)).schema()?,
-        Container::Arrow => arrow.insert(IpcReader::new(file)).schema()?,
+        Container::Arrow => {
+            let mut bytes = Vec::new();
+            again.read_to_end(&mut bytes)?;
+            let bytes: Arc<[u8]> = bytes.into();
+            let schema = arrow.insert(IpcReader::new(Cursor::new(Arc::clone(&bytes)))).schema()?;
+            polars_ensure!(buffers_agree(&bytes), ComputeError: "its buffers contradict its size");
+            schema
+        }
     };
     let (mut names, mut wanted, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for field in schema.iter_values() {
