@@ -85,6 +85,14 @@ fn a_table_reads_back_as_it_was_written_in_every_format() {
     ");
 }
 
+/// Time that grows with the square of the number of columns would be minutes here.
+#[test]
+fn a_wide_table_is_read_in_time() {
+    let header: Vec<String> = (0..200_000).map(|k| format!("c{k}")).collect();
+    let scene = Scene::new().with("wide.csv", format!("{}\n{}\n", header.join(","), vec!["1"; 200_000].join(",")));
+    assert_eq!(table(&scene, "wide.csv").floats("c199999").unwrap(), [Some(1.0)]);
+}
+
 #[test]
 fn cells_that_do_not_fit_are_shown_with_row_and_column() {
     let scene = Scene::new().with("a.csv", "t,q,n,id\n0,1,1,a\n\n1,abc,1.5,\n2,inf,x,c\n3,,,d\n4,NaN,1.0,7\n");

@@ -6,7 +6,8 @@ use trueup::strategies::STRATEGIES;
 
 use crate::scene::{Scene, shown};
 
-const BARS: &[u8] = b"ts,open,high,low,close,volume\n2024-03-08T14:30:00Z,10,12,9,11,100\n2024-03-08T14:31:00Z,11,12,10,11,5\n";
+const BARS: &[u8] =
+    b"ts,open,high,low,close,volume\n2024-03-08T14:30:00Z,10,12,9,11,100\n2024-03-08T14:31:00Z,11,12,10,11,5\n";
 const QUOTES: &[u8] = b"ts,bid,bid_size,ask,ask_size\n2024-03-08T14:30:00Z,10,1,11,1\n2024-03-08T14:31:00Z,10,1,11,1\n";
 
 pub fn target(scene: &Scene, bytes: &[u8]) {

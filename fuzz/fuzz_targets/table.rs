@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use trueup::io::{
-    Increase, OutputTable, Table, TimeFormat, TimeUnit, Values, check_increasing, check_not_negative,
-    check_positive, common_spacing,
+    Increase, OutputTable, Table, TimeFormat, TimeUnit, Values, check_increasing, check_not_negative, check_positive,
+    common_spacing,
 };
 
 use crate::scene::{Scene, shown};

@@ -10,7 +10,8 @@ use crate::scene::{Scene, shown};
 const JOINT: &str = "[twin]\nmodel = 'joint'\n[channels]\ncommand = { column = 'u' }\nposition = { column = 'q' }\n";
 const CART: &str = "[twin]\nmodel = 'cart_pole'\n[channels]\ncommand = { column = 'u' }\nposition = { column = 'q' }\n\
                     angle = { column = 'a' }\n";
-const TANKS: &str = "[twin]\nmodel = 'tanks'\n[channels]\ncommand = { column = 'u' }\nlevel = { column = 'q', unit = 'V' }\n";
+const TANKS: &str =
+    "[twin]\nmodel = 'tanks'\n[channels]\ncommand = { column = 'u' }\nlevel = { column = 'q', unit = 'V' }\n";
 const EQUATIONS: &str = "[twin]\nmodel = 'equations'\n[inputs]\nu = { column = 'u', interpolated = true }\n\
                          w = { column = 'q', interpolated = true }\n[outputs]\ny = { expression = 'x', column = 'q' }\n";
 

@@ -10,7 +10,9 @@ use crate::scene::{Scene, shown};
 
 pub fn target(scene: &Scene, bytes: &[u8]) {
     // Files that a twin may name.
-    ["quotes.parquet", "trades.parquet", "a/b c.csv", "a/\u{e9}\"'.csv"].iter().for_each(|name| drop(scene.once(name, b"x")));
+    ["quotes.parquet", "trades.parquet", "a/b c.csv", "a/\u{e9}\"'.csv"]
+        .iter()
+        .for_each(|name| drop(scene.once(name, b"x")));
     scene.once("out/nothing", b"");
     let Some(twin) = shown(TwinFile::read(scene.write("twin.toml", bytes))) else { return };
     match twin.model.as_str() {

@@ -5,7 +5,7 @@
 //! binary encoding of FlatBuffers.
 
 /// Most bytes that one byte becomes: a block of zstd repeats a byte 2^17 times, and is 4 bytes long.
-const MOST_EXPANSION: u64 = 1 << 15;
+pub(super) const MOST_EXPANSION: u64 = 1 << 15;
 /// Numbers of the fields of a `Footer`, and bytes of each `Block` it lists: offset, length of the message, length of the body.
 const FOOTER_BLOCKS: [usize; 2] = [2, 3];
 const BLOCK: usize = 24;
@@ -52,9 +52,9 @@ fn message_agrees(message: Bytes<'_>, body: &[u8], size: u64) -> Option<()> {
     let message = Bytes(message.0.get(before..)?);
     let table = message.root()?;
     let header = message.below(message.field(table, HEADER)??)?;
-    let batch = match message.0.get(message.field(table, HEADER_KIND)??)? {
-        &DICTIONARY_BATCH => message.below(message.field(header, DICTIONARY_DATA)??)?,
-        &RECORD_BATCH => header,
+    let batch = match *message.0.get(message.field(table, HEADER_KIND)??)? {
+        DICTIONARY_BATCH => message.below(message.field(header, DICTIONARY_DATA)??)?,
+        RECORD_BATCH => header,
         _ => return Some(()),
     };
     let compressed = message.field(batch, COMPRESSION)?.is_some();

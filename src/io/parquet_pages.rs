@@ -4,6 +4,8 @@
 //! machine has, which ends the process. Source of the layout: `parquet.thrift` of the format's specification, and the
 //! compact protocol of Thrift.
 
+use super::arrow_buffers::MOST_EXPANSION;
+
 /// What a page header says.
 #[derive(Debug, Default, Clone, Copy)]
 struct PageHeader {
@@ -13,6 +15,9 @@ struct PageHeader {
     values: i64,
 }
 
+/// Most values of a page: as many as the largest row group that writers make of a column that is all one value.
+const MOST_VALUES: i64 = 1 << 26;
+
 /// Whether the pages of a column chunk fit into its bytes and together have no more than its `values`.
 pub(super) fn pages_agree(chunk: &[u8], values: i64) -> bool {
     let mut thrift = Thrift { bytes: chunk, at: 0 };
@@ -21,8 +26,14 @@ pub(super) fn pages_agree(chunk: &[u8], values: i64) -> bool {
         let Some(header) = thrift.page_header() else { return false };
         let left = (chunk.len() - thrift.at) as i64;
         // No value of a dictionary is shorter than a byte.
-        let most = if header.dictionary { header.uncompressed } else { values - seen };
-        if !(0..=left).contains(&header.compressed) || header.uncompressed < 0 || !(0..=most).contains(&header.values) {
+        let most = if header.dictionary { header.uncompressed } else { (values - seen).min(MOST_VALUES) };
+        // Compressed or not, a page of levels and values is no longer than that.
+        let longest = header.compressed.saturating_add(1).saturating_mul(MOST_EXPANSION as i64);
+        if header.uncompressed > longest
+            || !(0..=left).contains(&header.compressed)
+            || header.uncompressed < 0
+            || !(0..=most).contains(&header.values)
+        {
             return false;
         }
         seen += if header.dictionary { 0 } else { header.values };
@@ -130,6 +141,13 @@ mod tests {
         assert!(pages_agree(&chunk, 6));
         assert!(!pages_agree(&chunk, 5), "more values than the footer says");
         assert!(!pages_agree(&chunk[..chunk.len() - 1], 6), "a page that goes beyond its chunk");
+        let header = |values: &[u8], size: &[u8]| {
+            let before = [&[0x15, 0, 0x15][..], size, &[0x15, 8, 0x2c, 0x15], values].concat();
+            [&before[..], &[0x15, 0, 0x15, 6, 0x15, 6, 0, 0, 1, 2, 3, 4]].concat()
+        };
+        assert!(pages_agree(&header(&[6], &[8]), 3));
+        assert!(!pages_agree(&header(&[0x80, 0x80, 0x80, 0x80, 0x04], &[8]), 1 << 29), "a page of 2^29 values");
+        assert!(!pages_agree(&header(&[6], &[0x80, 0x80, 0x80, 0x80, 0x04]), 3), "4 bytes that are 2^29");
         let mut negative = chunk.clone();
         negative[8] = 5;
         assert!(!pages_agree(&negative, 6), "a page of -3 values");

@@ -1,7 +1,7 @@
 //! A table: named columns read from a file, with errors that say where.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::columnar::{Column, ColumnarFile};
@@ -57,7 +57,8 @@ impl Table {
         };
         let table = Self { path: path.to_path_buf(), renames: renames.clone(), body };
         let own = table.own_names();
-        if let Some(name) = own.iter().enumerate().find_map(|(k, name)| own[..k].contains(name).then_some(name)) {
+        let mut seen = BTreeSet::new();
+        if let Some(name) = own.iter().find(|name| !seen.insert(name.as_str())) {
             return Err(InputError::new(path, format!("two columns are named `{name}`")).hint("rename or drop one of them"));
         }
         for (name, file_name) in renames {
@@ -265,9 +266,9 @@ impl Table {
             Body::Csv(csv) => Cells::Text(Box::new((0..csv.rows()).map(move |row| csv.cell(row, index)))),
             Body::Columnar(file) => match file.column(own) {
                 // Some writers keep numbers as texts: they are read as a CSV's cells are.
-                Column::Texts(values) => Cells::Text(Box::new(
-                    values.into_iter().map(|v| v.map_or(Cow::Borrowed(""), Cow::Owned)),
-                )),
+                Column::Texts(values) => {
+                    Cells::Text(Box::new(values.into_iter().map(|v| v.map_or(Cow::Borrowed(""), Cow::Owned))))
+                }
                 other => Cells::Typed(other),
             },
         })
