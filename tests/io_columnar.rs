@@ -92,22 +92,21 @@ fn an_arrow_file_is_refused_wherever_it_is_cut() {
 
 /// A length that is damaged must not make the decoder ask for more memory than there is, which would end the process.
 #[test]
-fn a_damaged_byte_gives_an_error_or_a_table() {
-    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds");
+fn a_damaged_byte_of_an_arrow_file_gives_an_error_or_a_table() {
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/arrow");
     let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.arrow");
     let mut refused = 0;
-    for ending in ["arrow", "parquet"] {
-        let path = folder.path().join("a").with_extension(ending);
-        for seed in std::fs::read_dir(seeds.join(ending)).unwrap() {
-            let whole = std::fs::read(seed.unwrap().path()).unwrap();
-            for (at, bits) in (0..whole.len()).flat_map(|at| [0x01, 0x7f, 0xff].map(|bits| (at, bits))) {
-                let mut bytes = whole.clone();
-                bytes[at] ^= bits;
-                std::fs::write(&path, bytes).unwrap();
-                match Table::read(&path) {
-                    Ok(table) => table.names().into_iter().for_each(|name| drop(table.texts(name))),
-                    Err(error) => refused += usize::from(error.hint.is_some()),
-                }
+    for seed in std::fs::read_dir(seeds).unwrap() {
+        let whole = std::fs::read(seed.unwrap().path()).unwrap();
+        for at in 0..whole.len() {
+            let mut bytes = whole.clone();
+            // The highest byte of a length becomes the highest there is.
+            bytes[at] ^= 0x7f;
+            std::fs::write(&path, bytes).unwrap();
+            match Table::read(&path) {
+                Ok(table) => table.names().into_iter().for_each(|name| drop(table.texts(name))),
+                Err(error) => refused += usize::from(error.hint.is_some()),
             }
         }
     }
