@@ -113,6 +113,16 @@ fn a_damaged_byte_of_an_arrow_file_gives_an_error_or_a_table() {
     assert!(refused > 1_000, "{refused}");
 }
 
+/// As above, of a list in a footer.
+#[test]
+fn a_parquet_footer_with_a_list_beyond_its_end_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    std::fs::write(&path, include_bytes!("../fuzz/seeds/parquet/long_list")).unwrap();
+    let message = Table::read(&path).unwrap_err().message;
+    assert!(message.contains("the lists of its footer contradict its length"), "{message}");
+}
+
 /// Every table below `folder`.
 fn tables(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {

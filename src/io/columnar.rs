@@ -14,7 +14,7 @@ use polars::prelude::{
 
 use super::arrow_buffers::buffers_agree;
 use super::error::InputError;
-use super::parquet_pages::pages_agree;
+use super::parquet_pages::{footer_agrees, pages_agree};
 
 /// The values of one column, in the few types that recordings are made of.
 pub(super) enum Column {
@@ -102,7 +102,10 @@ fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
     let mut parquet = None;
     let mut arrow = None;
     let schema = match container {
-        Container::Parquet => parquet.insert(ParquetReader::new(file)).schema()?,
+        Container::Parquet => {
+            check_footer(&mut again, size)?;
+            parquet.insert(ParquetReader::new(file)).schema()?
+        }
         Container::Arrow => {
             let mut bytes = Vec::new();
             again.read_to_end(&mut bytes)?;
@@ -130,6 +133,22 @@ fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
         (None, None) => DataFrame::empty(),
     };
     Ok(ColumnarFile { frame, names, left_out })
+}
+
+/// Holds the lists of a Parquet footer to its length, where there is one: it stands before its length and `PAR1`.
+fn check_footer(file: &mut File, size: u64) -> PolarsResult<()> {
+    let mut tail = [0; 8];
+    let Some(end) = size.checked_sub(8) else { return Ok(()) };
+    file.seek(SeekFrom::Start(end))?;
+    file.read_exact(&mut tail)?;
+    let [a, b, c, d, magic @ ..] = tail;
+    let start = end.checked_sub(u32::from_le_bytes([a, b, c, d]).into()).filter(|_| magic == *b"PAR1");
+    let Some(start) = start else { return Ok(()) };
+    let mut footer = Vec::new();
+    file.seek(SeekFrom::Start(start))?;
+    file.take(end - start).read_to_end(&mut footer)?;
+    polars_ensure!(footer_agrees(&footer), ComputeError: "the lists of its footer contradict its length");
+    Ok(())
 }
 
 /// Holds the counts of a Parquet footer and of the page headers to agree with each other and with the size of the file
