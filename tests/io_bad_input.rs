@@ -43,12 +43,16 @@ fn table(scene: &Scene, name: &str) -> Table {
     Table::read(scene.path(name)).unwrap()
 }
 
+/// A name with blanks and a mark of the byte order, which belong to it.
+const NOTE: &str = "\u{feff}note \n";
+
 fn sample() -> OutputTable {
     OutputTable::new()
         .times("ts", [Timestamp(1_612_517_760_002_000_050), Timestamp(1_612_517_761_000_000_000)])
         .floats("price", [Some(1000.25), None])
         .integers("size", [100, -3])
         .texts("side", [Some("buy, \"now\"".to_owned()), None])
+        .texts(NOTE, [Some(" \n".to_owned()), Some("\u{feff}'".to_owned())])
 }
 
 #[test]
@@ -57,7 +61,7 @@ fn a_table_reads_back_as_it_was_written_in_every_format() {
     for name in ["a.csv", "a.parquet"] {
         write_table(scene.path(name), &sample(), Overwrite::Refuse).unwrap();
         let table = table(&scene, name);
-        assert_eq!((table.rows(), table.names()), (2, vec!["ts", "price", "size", "side"]));
+        assert_eq!((table.rows(), table.names()), (2, vec!["ts", "price", "size", "side", NOTE]));
         let format = TimeFormat { zone: chrono_tz::Tz::America__New_York, unit: TimeUnit::Seconds };
         let times = table.times("ts", &format).unwrap();
         assert_eq!(times, [Timestamp(1_612_517_760_002_000_050), Timestamp(1_612_517_761_000_000_000)], "{name}");
@@ -66,6 +70,7 @@ fn a_table_reads_back_as_it_was_written_in_every_format() {
         assert_eq!(table.integers("size").unwrap(), [Some(100), Some(-3)]);
         assert_eq!(table.texts("size").unwrap(), [Some("100".to_owned()), Some("-3".to_owned())]);
         assert_eq!(table.texts("side").unwrap(), [Some("buy, \"now\"".to_owned()), None]);
+        assert_eq!(table.texts(NOTE).unwrap(), [Some(" \n".to_owned()), Some("\u{feff}'".to_owned())]);
         let bytes = fs::read(scene.path(name)).unwrap();
         assert_eq!(sample().bytes(Path::new(name)).unwrap(), bytes, "the same table, other bytes");
     }
@@ -78,6 +83,14 @@ fn a_table_reads_back_as_it_was_written_in_every_format() {
     cut.csv.gz: expected a whole gzip file (incomplete deflate stream)
       hint: the file is truncated, corrupt or not compressed: copy or write it again
     ");
+}
+
+/// Time that grows with the square of the number of columns would be minutes here.
+#[test]
+fn a_wide_table_is_read_in_time() {
+    let header: Vec<String> = (0..200_000).map(|k| format!("c{k}")).collect();
+    let scene = Scene::new().with("wide.csv", format!("{}\n{}\n", header.join(","), vec!["1"; 200_000].join(",")));
+    assert_eq!(table(&scene, "wide.csv").floats("c199999").unwrap(), [Some(1.0)]);
 }
 
 #[test]

@@ -90,6 +90,39 @@ fn an_arrow_file_is_refused_wherever_it_is_cut() {
     }
 }
 
+/// A length that is damaged must not make the decoder ask for more memory than there is, which would end the process.
+#[test]
+fn a_damaged_byte_of_an_arrow_file_gives_an_error_or_a_table() {
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/arrow");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.arrow");
+    let mut refused = 0;
+    for seed in std::fs::read_dir(seeds).unwrap() {
+        let whole = std::fs::read(seed.unwrap().path()).unwrap();
+        for at in 0..whole.len() {
+            let mut bytes = whole.clone();
+            // The highest byte of a length becomes the highest there is.
+            bytes[at] ^= 0x7f;
+            std::fs::write(&path, bytes).unwrap();
+            match Table::read(&path) {
+                Ok(table) => table.names().into_iter().for_each(|name| drop(table.texts(name))),
+                Err(error) => refused += usize::from(error.hint.is_some()),
+            }
+        }
+    }
+    assert!(refused > 1_000, "{refused}");
+}
+
+/// As above, of a list in a footer.
+#[test]
+fn a_parquet_footer_with_a_list_beyond_its_end_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    std::fs::write(&path, include_bytes!("../fuzz/seeds/parquet/long_list")).unwrap();
+    let message = Table::read(&path).unwrap_err().message;
+    assert!(message.contains("the lists of its footer contradict its length"), "{message}");
+}
+
 /// Every table below `folder`.
 fn tables(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {

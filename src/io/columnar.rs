@@ -1,9 +1,10 @@
 //! Parquet and Arrow files; the only place, with [`write`](super::write), that knows the data-frame library.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::Arc;
 
 use chrono::{DateTime, NaiveDateTime};
 use polars::prelude::{
@@ -11,8 +12,9 @@ use polars::prelude::{
     TimeZone, polars_ensure,
 };
 
+use super::arrow_buffers::buffers_agree;
 use super::error::InputError;
-use super::parquet_pages::pages_agree;
+use super::parquet_pages::{footer_agrees, pages_agree};
 
 /// The values of one column, in the few types that recordings are made of.
 pub(super) enum Column {
@@ -96,12 +98,22 @@ fn first_line(text: &str) -> String {
 }
 
 fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
-    let (size, again) = (file.metadata()?.len(), file.try_clone()?);
+    let (size, mut again) = (file.metadata()?.len(), file.try_clone()?);
     let mut parquet = None;
     let mut arrow = None;
     let schema = match container {
-        Container::Parquet => parquet.insert(ParquetReader::new(file)).schema()?,
-        Container::Arrow => arrow.insert(IpcReader::new(file)).schema()?,
+        Container::Parquet => {
+            check_footer(&mut again, size)?;
+            parquet.insert(ParquetReader::new(file)).schema()?
+        }
+        Container::Arrow => {
+            let mut bytes = Vec::new();
+            again.read_to_end(&mut bytes)?;
+            let bytes: Arc<[u8]> = bytes.into();
+            let schema = arrow.insert(IpcReader::new(Cursor::new(Arc::clone(&bytes)))).schema()?;
+            polars_ensure!(buffers_agree(&bytes), ComputeError: "its buffers contradict its size");
+            schema
+        }
     };
     let (mut names, mut wanted, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
     for field in schema.iter_values() {
@@ -121,6 +133,22 @@ fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
         (None, None) => DataFrame::empty(),
     };
     Ok(ColumnarFile { frame, names, left_out })
+}
+
+/// Holds the lists of a Parquet footer to its length, where there is one: it stands before its length and `PAR1`.
+fn check_footer(file: &mut File, size: u64) -> PolarsResult<()> {
+    let mut tail = [0; 8];
+    let Some(end) = size.checked_sub(8) else { return Ok(()) };
+    file.seek(SeekFrom::Start(end))?;
+    file.read_exact(&mut tail)?;
+    let [a, b, c, d, magic @ ..] = tail;
+    let start = end.checked_sub(u32::from_le_bytes([a, b, c, d]).into()).filter(|_| magic == *b"PAR1");
+    let Some(start) = start else { return Ok(()) };
+    let mut footer = Vec::new();
+    file.seek(SeekFrom::Start(start))?;
+    file.take(end - start).read_to_end(&mut footer)?;
+    polars_ensure!(footer_agrees(&footer), ComputeError: "the lists of its footer contradict its length");
+    Ok(())
 }
 
 /// Holds the counts of a Parquet footer and of the page headers to agree with each other and with the size of the file

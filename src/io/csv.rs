@@ -43,8 +43,7 @@ impl CsvText {
             }
             header.clear();
         };
-        let names: Vec<String> =
-            (0..header.len()).map(|k| unquote(cell(&text, start, &header, k)).trim().to_owned()).collect();
+        let names: Vec<String> = (0..header.len()).map(|k| shown(cell(&text, start, &header, k)).into_owned()).collect();
         let (mut starts, mut ends, mut lines) = (Vec::new(), Vec::new(), Vec::new());
         while cursor.at < text.len() {
             let (start, line, before) = (cursor.at, cursor.line, ends.len());
@@ -80,11 +79,10 @@ impl CsvText {
         self.lines.get(row).copied().unwrap_or_default()
     }
 
-    /// A cell without its quotes and without blanks around it.
+    /// A cell without its quotes, or without the blanks around it.
     pub(super) fn cell(&self, row: usize, column: usize) -> Cow<'_, str> {
         let width = self.names.len();
-        let raw = cell(&self.text, self.starts[row], &self.ends[row * width..(row + 1) * width], column);
-        if raw.as_bytes().first() == Some(&b'"') { unquote(raw) } else { Cow::Borrowed(raw.trim()) }
+        shown(cell(&self.text, self.starts[row], &self.ends[row * width..(row + 1) * width], column))
     }
 }
 
@@ -95,6 +93,11 @@ fn is_blank(row: &str) -> bool {
 fn cell<'a>(text: &'a str, start: usize, ends: &[u32], k: usize) -> &'a str {
     let from = if k == 0 { start } else { start + ends[k - 1] as usize + 1 };
     text[from..start + ends[k] as usize].trim_end_matches('\r')
+}
+
+/// A cell without its quotes, or without the blanks around it.
+fn shown(raw: &str) -> Cow<'_, str> {
+    if raw.starts_with('"') { unquote(raw) } else { Cow::Borrowed(raw.trim()) }
 }
 
 fn unquote(raw: &str) -> Cow<'_, str> {

@@ -127,9 +127,15 @@ impl fmt::Display for InputError {
 /// differ (of very short words one letter, if another stays), or one word must begin with the other.
 #[must_use]
 pub fn did_you_mean<C: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = C>) -> Option<String> {
+    // The distance takes the product of both lengths to compute; nobody mistypes a word that long.
+    const LONGEST: usize = 100;
+    if word.len() > LONGEST {
+        return None;
+    }
     let word = word.to_lowercase();
     candidates
         .into_iter()
+        .filter(|candidate| candidate.as_ref().len() <= LONGEST)
         .filter_map(|candidate| {
             let other = candidate.as_ref().to_lowercase();
             let distance = strsim::damerau_levenshtein(&word, &other);
@@ -193,6 +199,8 @@ mod tests {
         assert_eq!(did_you_mean("t", ["q", "u", "time"]), None);
         assert_eq!(did_you_mean("pso", ["position", "velocity"]), None);
         assert_eq!(did_you_mean("bidd", ["ask", "bid", "bid2"]).as_deref(), Some("bid"));
+        // Without regard to such words this would take minutes.
+        assert_eq!(did_you_mean(&"a".repeat(1_000_000), ["b".repeat(1_000_000)]), None);
         assert_eq!(hint_among("zzz", &["a", "b", "c"]).as_deref(), Some("there are `a`, `b` and `c`"));
     }
 }

@@ -1,5 +1,7 @@
 //! `[[instrument]]`, as twins and runs declare it.
 
+use std::collections::BTreeSet;
+
 use serde::Deserialize;
 
 use super::document::Document;
@@ -28,6 +30,7 @@ fn one() -> f64 {
 
 /// Holds instruments to have sizes greater than 0 and symbols of their own.
 pub(super) fn check_instruments(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
+    let mut seen = BTreeSet::new();
     for (index, instrument) in instruments.iter().enumerate() {
         let number = index.to_string();
         let sizes = [
@@ -44,7 +47,7 @@ pub(super) fn check_instruments(document: &Document, instruments: &[InstrumentEn
                     .hint("correct the value, or leave the key out where it may be"));
             }
         }
-        if instruments[..index].iter().any(|earlier| earlier.symbol == instrument.symbol) {
+        if !seen.insert(instrument.symbol.as_str()) {
             let message = format!("the instrument `{}` is here twice", instrument.symbol);
             return Err(document.error(&["instrument", &number, "symbol"], message).hint("drop one of the two"));
         }

@@ -1,6 +1,7 @@
 //! Files: the only file access below the command line. Reads and writes tables and TOML documents; what their rows
 //! and keys mean is the domains' business: nothing here knows a joint or an order.
 
+mod arrow_buffers;
 mod check;
 mod columnar;
 mod controller_entry;

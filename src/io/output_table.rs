@@ -103,6 +103,12 @@ impl OutputTable {
         self
     }
 
+    /// Its columns: names and values.
+    #[must_use]
+    pub fn columns(&self) -> &[(String, Values)] {
+        &self.columns
+    }
+
     /// The table as the bytes of a file of that name: CSV or Parquet, by its ending.
     ///
     /// # Errors
@@ -151,8 +157,9 @@ impl OutputTable {
     }
 }
 
-/// A cell in quotes where it needs them; an empty one too where it stands `alone`, for blank lines are no rows.
+/// A cell in quotes where it needs them; an empty one too where it stands `alone`, for blank lines are no rows. A mark of
+/// the byte order is one only where a file starts with it.
 fn quoted(cell: &str, alone: bool) -> String {
-    let special = cell.contains([',', '"', '\n', '\r']) || cell.trim() != cell || (alone && cell.is_empty());
+    let special = cell.contains([',', '"', '\n', '\r', '\u{feff}']) || cell.trim() != cell || (alone && cell.is_empty());
     if special { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
 }

@@ -4,6 +4,8 @@
 //! machine has, which ends the process. Source of the layout: `parquet.thrift` of the format's specification, and the
 //! compact protocol of Thrift.
 
+use super::arrow_buffers::MOST_EXPANSION;
+
 /// What a page header says.
 #[derive(Debug, Default, Clone, Copy)]
 struct PageHeader {
@@ -13,7 +15,11 @@ struct PageHeader {
     values: i64,
 }
 
-/// Whether the pages of a column chunk fit into its bytes and together have no more than its `values`.
+/// Most values of a page: as many as the largest row group that writers make of a column that is all one value.
+const MOST_VALUES: i64 = 1 << 26;
+
+/// Whether the pages of a column chunk fit into its bytes and together have its `values`: the decoder makes room for these
+/// before it sees that there are fewer.
 pub(super) fn pages_agree(chunk: &[u8], values: i64) -> bool {
     let mut thrift = Thrift { bytes: chunk, at: 0 };
     let mut seen = 0;
@@ -21,14 +27,25 @@ pub(super) fn pages_agree(chunk: &[u8], values: i64) -> bool {
         let Some(header) = thrift.page_header() else { return false };
         let left = (chunk.len() - thrift.at) as i64;
         // No value of a dictionary is shorter than a byte.
-        let most = if header.dictionary { header.uncompressed } else { values - seen };
-        if !(0..=left).contains(&header.compressed) || header.uncompressed < 0 || !(0..=most).contains(&header.values) {
+        let most = if header.dictionary { header.uncompressed } else { (values - seen).min(MOST_VALUES) };
+        // Compressed or not, a page of levels and values is no longer than that.
+        let longest = header.compressed.saturating_add(1).saturating_mul(MOST_EXPANSION as i64);
+        if header.uncompressed > longest
+            || !(0..=left).contains(&header.compressed)
+            || header.uncompressed < 0
+            || !(0..=most).contains(&header.values)
+        {
             return false;
         }
         seen += if header.dictionary { 0 } else { header.values };
         thrift.at += header.compressed as usize;
     }
-    true
+    seen == values
+}
+
+/// Whether the lists of a footer are no longer than it is: the decoder makes room for them first.
+pub(super) fn footer_agrees(footer: &[u8]) -> bool {
+    Thrift { bytes: footer, at: 0 }.value(12, 0).is_some()
 }
 
 struct Thrift<'a> {
@@ -88,6 +105,44 @@ impl Thrift<'_> {
         }
     }
 
+    /// Goes over a value of that kind.
+    fn value(&mut self, kind: u8, depth: u8) -> Option<()> {
+        match kind {
+            4..=6 => self.varint().map(drop),
+            9 | 10 if depth < 16 => {
+                let head = self.byte()?;
+                let count = if head >> 4 == 15 { self.varint()? } else { u64::from(head >> 4) };
+                // No item is shorter than a byte, and a boolean is one.
+                let fits = count <= (self.bytes.len() - self.at) as u64;
+                match head & 0x0f {
+                    _ if !fits => None,
+                    1 | 2 => self.skip(count),
+                    kind => (0..count).try_for_each(|_| self.value(kind, depth + 1)),
+                }
+            }
+            12 if depth < 16 => loop {
+                let head = self.byte()?;
+                match head & 0x0f {
+                    0 => return Some(()),
+                    _ if head >> 4 == 0 => self.zigzag().map(drop)?,
+                    _ => {}
+                }
+                // A boolean is in its head already.
+                if !matches!(head & 0x0f, 1 | 2) {
+                    self.value(head & 0x0f, depth + 1)?;
+                }
+            },
+            3 => self.skip(1),
+            7 => self.skip(8),
+            8 => {
+                let length = self.varint()?;
+                self.skip(length)
+            }
+            // There are no maps in a footer.
+            _ => None,
+        }
+    }
+
     fn byte(&mut self) -> Option<u8> {
         let byte = self.bytes.get(self.at).copied()?;
         self.at += 1;
@@ -125,11 +180,28 @@ mod tests {
     const PAGE: [u8; 20] = [0x15, 0, 0x15, 8, 0x15, 8, 0x2c, 0x15, 6, 0x15, 0, 0x15, 6, 0x15, 6, 0, 0, 1, 2, 3];
 
     #[test]
+    fn a_list_beyond_its_footer_is_found() {
+        // Field 2: a list of 2 structures, each with an integer in field 1; of 15 and more, the count follows.
+        assert!(footer_agrees(&[0x29, 0x2c, 0x15, 2, 0, 0x15, 4, 0, 0]));
+        assert!(!footer_agrees(&[0x29, 0xfc, 0x80, 0x80, 0x80, 0x80, 0x04, 0x15, 2, 0, 0x15, 4, 0, 0]));
+        assert!(!footer_agrees(&[0x19; 1_000_000]), "lists within lists");
+        assert!(!footer_agrees(&[0x29, 0x3c, 0x15, 2, 0, 0x15, 4, 0, 0]));
+    }
+
+    #[test]
     fn pages_are_counted_and_measured() {
         let chunk = [&PAGE[..], &[4], &PAGE[..], &[4]].concat();
         assert!(pages_agree(&chunk, 6));
+        assert!(!pages_agree(&chunk, 7), "fewer values than the footer says");
         assert!(!pages_agree(&chunk, 5), "more values than the footer says");
         assert!(!pages_agree(&chunk[..chunk.len() - 1], 6), "a page that goes beyond its chunk");
+        let header = |values: &[u8], size: &[u8]| {
+            let before = [&[0x15, 0, 0x15][..], size, &[0x15, 8, 0x2c, 0x15], values].concat();
+            [&before[..], &[0x15, 0, 0x15, 6, 0x15, 6, 0, 0, 1, 2, 3, 4]].concat()
+        };
+        assert!(pages_agree(&header(&[6], &[8]), 3));
+        assert!(!pages_agree(&header(&[0x80, 0x80, 0x80, 0x80, 0x04], &[8]), 1 << 29), "a page of 2^29 values");
+        assert!(!pages_agree(&header(&[6], &[0x80, 0x80, 0x80, 0x80, 0x04]), 3), "4 bytes that are 2^29");
         let mut negative = chunk.clone();
         negative[8] = 5;
         assert!(!pages_agree(&negative, 6), "a page of -3 values");

@@ -1,5 +1,6 @@
 //! Numbers of documents, with unit and uncertainty, and the mechanisms made of them.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::de::value::MapAccessDeserializer;
@@ -165,9 +166,10 @@ impl<'de> Deserialize<'de> for MechanismEntry {
 
 /// Holds the mechanisms of a document to be finite and each to stand there once.
 pub(super) fn check_mechanisms(document: &Document, mechanisms: &[MechanismEntry]) -> Result<(), InputError> {
+    let mut seen = BTreeSet::new();
     for (index, mechanism) in mechanisms.iter().enumerate() {
         let number = index.to_string();
-        if mechanisms[..index].iter().any(|earlier| earlier.name == mechanism.name) {
+        if !seen.insert(mechanism.name.as_str()) {
             return Err(document
                 .error(&["mechanism", &number, "name"], format!("the mechanism `{}` is here twice", mechanism.name))
                 .hint("drop one of the two, or give one the effect of both"));

@@ -1,7 +1,7 @@
 //! A table: named columns read from a file, with errors that say where.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::columnar::{Column, ColumnarFile};
@@ -57,7 +57,8 @@ impl Table {
         };
         let table = Self { path: path.to_path_buf(), renames: renames.clone(), body };
         let own = table.own_names();
-        if let Some(name) = own.iter().enumerate().find_map(|(k, name)| own[..k].contains(name).then_some(name)) {
+        let mut seen = BTreeSet::new();
+        if let Some(name) = own.iter().find(|name| !seen.insert(name.as_str())) {
             return Err(InputError::new(path, format!("two columns are named `{name}`")).hint("rename or drop one of them"));
         }
         for (name, file_name) in renames {
@@ -215,8 +216,8 @@ impl Table {
     pub fn times_with_holes(&self, name: &str, format: &TimeFormat) -> Result<Vec<Option<Timestamp>>, InputError> {
         let explain = |row: usize, why: NotATime| self.error(name, row, why.message()).hint(why.hint());
         match self.column(name)? {
-            Cells::Text(texts) => each(texts.map(|text| Some(text).filter(|t| !t.is_empty())), |row, text| {
-                format.text(&text).map_err(|why| explain(row, why).found_text(&text))
+            Cells::Text(texts) => each(texts.map(|text| Some(text).filter(|t| !t.trim().is_empty())), |row, text| {
+                format.text(text.trim()).map_err(|why| explain(row, why).found_text(&text))
             }),
             Cells::Typed(Column::Integers(values)) => {
                 each(values, |row, v| format.count(v).map_err(|why| explain(row, why).found(v)))
@@ -265,9 +266,9 @@ impl Table {
             Body::Csv(csv) => Cells::Text(Box::new((0..csv.rows()).map(move |row| csv.cell(row, index)))),
             Body::Columnar(file) => match file.column(own) {
                 // Some writers keep numbers as texts: they are read as a CSV's cells are.
-                Column::Texts(values) => Cells::Text(Box::new(
-                    values.into_iter().map(|v| v.map_or(Cow::Borrowed(""), |v| Cow::Owned(v.trim().to_owned()))),
-                )),
+                Column::Texts(values) => {
+                    Cells::Text(Box::new(values.into_iter().map(|v| v.map_or(Cow::Borrowed(""), Cow::Owned))))
+                }
                 other => Cells::Typed(other),
             },
         })
@@ -349,6 +350,7 @@ const NO_NUMBER: Wrong = ("expected a number", "leave the cell empty where a sam
 const NO_INTEGER: Wrong = ("expected an integer", "round the column, or write it without a fraction");
 
 fn number(text: &str) -> Result<Option<f64>, Wrong> {
+    let text = text.trim();
     if text.is_empty() {
         return Ok(None);
     }
@@ -361,7 +363,7 @@ fn number(text: &str) -> Result<Option<f64>, Wrong> {
 }
 
 fn integer(text: &str) -> Result<Option<i64>, Wrong> {
-    match text.parse::<i64>() {
+    match text.trim().parse::<i64>() {
         Ok(value) => Ok(Some(value)),
         Err(_) => match number(text) {
             Ok(None) => Ok(None),

@@ -175,6 +175,17 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_read_to_the_last_bit() {
+        let (text, mut lines) = journal(1);
+        for seconds in [0.001_002_533_668_314_746_3, 0.096_235_399_270_900_12, 5e-324, f64::MAX] {
+            lines[0].trial.seconds = seconds;
+            let header = text.lines().next().unwrap();
+            let again = Journal::read(&format!("{header}\n{}", lines[0].text().unwrap())).unwrap();
+            assert_eq!(again.lines[0].trial.seconds.to_bits(), seconds.to_bits());
+        }
+    }
+
+    #[test]
     fn a_label_that_was_changed_after_sealing_is_found_out() {
         let (text, _) = journal(2);
         let forged = text.replacen("1.6666666666666667", "1.7666666666666667", 1);

@@ -343,6 +343,23 @@ mod tests {
         StateVariable { name: name.into(), unit: unit.into(), initial, std: None }
     }
 
+    /// Time that grows with the square of what is read would be minutes here.
+    #[test]
+    fn large_systems_are_made_ready_in_time_and_larger_ones_refused() {
+        let long = |k: usize| (0..150).map(|n| format!("{k}.{n}*x")).collect::<Vec<_>>().join(" + ");
+        let chain = |k: usize| format!("d{}", k + 1);
+        for text in [&long as &dyn Fn(usize) -> String, &chain] {
+            let mut definitions: Vec<(String, String)> = (0..900).map(|k| (format!("d{k}"), text(k))).collect();
+            definitions.push(("d900".into(), "2*x".into()));
+            let mut system = duffing();
+            system.definitions.extend(definitions);
+            assert!(Equations::new(system.clone(), 1e-3).is_ok());
+            system.definitions.extend((901..1_200).map(|k| (format!("d{k}"), "x".into())));
+            let error = Equations::new(system, 1e-3).unwrap_err();
+            assert!(error.message.contains("at most 1000 names"), "{error}");
+        }
+    }
+
     /// A mass on a spring that hardens: Duffing's oscillator.
     fn duffing() -> EquationSystem {
         let parameter = |(name, value): (&'static str, f64)| Parameter::new(name, "", value).known_to(0.1 * value);

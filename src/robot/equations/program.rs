@@ -1,9 +1,11 @@
 //! Expressions made ready to be evaluated over all lanes at once.
 
+use std::collections::HashMap;
+
 use super::expression::{Expression, FUNCTIONS, FUNCTIONS_OF_TWO, Operator};
 
 /// What an instruction does with its operands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Op {
     Add,
     Subtract,
@@ -41,9 +43,13 @@ pub(super) struct Program {
 #[derive(Default)]
 struct Builder<'a> {
     /// What a name stands for.
-    named: Vec<(&'a str, usize)>,
+    named: HashMap<&'a str, usize>,
     constants: Vec<(usize, f64)>,
+    /// Slots of the constants, by their bits.
+    known_constants: HashMap<u64, usize>,
     instructions: Vec<Instruction>,
+    /// Slots of their results, by what they do with which operands.
+    known_results: HashMap<(Op, usize, usize), usize>,
     /// Of each slot, whether it is the same throughout a run.
     lasting: Vec<bool>,
 }
@@ -65,7 +71,7 @@ impl Program {
         let mut builder = Builder { named, lasting, ..Builder::default() };
         for (name, definition) in definitions {
             let slot = builder.add(definition)?;
-            builder.named.push((name, slot));
+            builder.named.insert(name, slot);
         }
         let outputs = expressions.iter().map(|e| builder.add(e)).collect::<Result<Vec<usize>, String>>()?;
         let Builder { constants, instructions, lasting, .. } = builder;
@@ -185,9 +191,7 @@ impl Builder<'_> {
     fn add(&mut self, expression: &Expression) -> Result<usize, String> {
         Ok(match expression {
             Expression::Number(value) => self.constant(*value),
-            Expression::Name(name) => {
-                self.named.iter().find(|(known, _)| known == name).map(|(_, slot)| *slot).ok_or_else(|| name.clone())?
-            }
+            Expression::Name(name) => self.named.get(name.as_str()).copied().ok_or_else(|| name.clone())?,
             Expression::Negative(one) => {
                 let one = self.add(one)?;
                 self.result(Op::Negate, one, one)
@@ -228,23 +232,22 @@ impl Builder<'_> {
     }
 
     fn constant(&mut self, value: f64) -> usize {
-        if let Some((slot, _)) = self.constants.iter().find(|(_, known)| known.to_bits() == value.to_bits()) {
-            return *slot;
-        }
-        self.lasting.push(true);
-        self.constants.push((self.lasting.len() - 1, value));
-        self.lasting.len() - 1
+        let Self { lasting, constants, known_constants, .. } = self;
+        *known_constants.entry(value.to_bits()).or_insert_with(|| {
+            lasting.push(true);
+            constants.push((lasting.len() - 1, value));
+            lasting.len() - 1
+        })
     }
 
     fn result(&mut self, op: Op, left: usize, right: usize) -> usize {
-        let known = self.instructions.iter().find(|i| (i.op, i.left, i.right) == (op, left, right));
-        if let Some(known) = known {
-            return known.to;
-        }
-        let to = self.lasting.len();
-        self.lasting.push(self.lasting[left] && self.lasting[right]);
-        self.instructions.push(Instruction { op, left, right, to });
-        to
+        let Self { lasting, instructions, known_results, .. } = self;
+        *known_results.entry((op, left, right)).or_insert_with(|| {
+            let to = lasting.len();
+            lasting.push(lasting[left] && lasting[right]);
+            instructions.push(Instruction { op, left, right, to });
+            to
+        })
     }
 }
 

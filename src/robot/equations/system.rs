@@ -1,5 +1,7 @@
 //! Equations as a user gives them, and what is wrong with them.
 
+use std::collections::{BTreeSet, HashMap, HashSet};
+
 use super::expression::{Expression, is_name, reserved};
 use super::program::Program;
 use crate::sim2real::{Channel, Parameter};
@@ -198,6 +200,9 @@ impl Model {
     }
 }
 
+/// Most names that a system may have: more is no plant that anybody writes down, and would take long to make ready.
+const MOST_NAMES: usize = 1_000;
+
 /// Holds names to be names, each to stand for one thing, and the system to have something to follow.
 fn check_names(system: &EquationSystem) -> Result<(), EquationError> {
     let states = system.states.iter().map(|s| ("states", s.name.as_str()));
@@ -205,6 +210,11 @@ fn check_names(system: &EquationSystem) -> Result<(), EquationError> {
     let parameters = system.parameters.iter().map(|p| ("parameters", p.name.as_ref()));
     let definitions = system.definitions.iter().map(|(name, _)| ("definitions", name.as_str()));
     let all: Vec<(&str, &str)> = states.chain(inputs).chain(parameters).chain(definitions).collect();
+    if let Some((section, name)) = all.get(MOST_NAMES) {
+        let message = format!("expected at most {MOST_NAMES} names of states, inputs, parameters and definitions");
+        let error = EquationError::at(&[section, name], format!("{message}, found {}", all.len()));
+        return Err(error.hint("join definitions that are used once"));
+    }
     for (k, (section, name)) in all.iter().enumerate() {
         if !is_name(name) {
             let error = EquationError::at(&[section, name], format!("`{name}` cannot stand in an expression"));
@@ -240,20 +250,31 @@ fn parse(place: &[&str], text: &str) -> Result<Expression, EquationError> {
 
 /// The definitions in an order in which each uses only those before it.
 fn definitions(system: &EquationSystem) -> Result<Vec<(String, Expression)>, EquationError> {
-    let mut waiting = Vec::new();
+    let mut parsed = Vec::new();
     for (name, text) in &system.definitions {
-        waiting.push((name.clone(), parse(&["definitions", name], text)?));
+        parsed.push((name.clone(), parse(&["definitions", name], text)?));
     }
-    let mut ordered: Vec<(String, Expression)> = Vec::new();
-    while !waiting.is_empty() {
-        let names: Vec<String> = waiting.iter().map(|(name, _)| name.clone()).collect();
-        let ready = |expression: &Expression| expression.names().iter().all(|n| !names.iter().any(|other| other == n));
-        let Some(next) = waiting.iter().position(|(_, expression)| ready(expression)) else {
+    let numbers: HashMap<&str, usize> = parsed.iter().enumerate().map(|(k, (name, _))| (name.as_str(), k)).collect();
+    // Of each, the definitions that it waits for.
+    let mut needs: Vec<HashSet<usize>> = parsed
+        .iter()
+        .map(|(_, expression)| expression.names().into_iter().filter_map(|name| numbers.get(name).copied()).collect())
+        .collect();
+    let mut waiting: BTreeSet<usize> = (0..parsed.len()).collect();
+    let mut ordered = Vec::new();
+    while let Some(first) = waiting.first() {
+        let Some(next) = waiting.iter().copied().find(|k| needs[*k].is_empty()) else {
+            let names: Vec<&str> = waiting.iter().map(|k| parsed[*k].0.as_str()).collect();
             let circle = names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-            let error = EquationError::at(&["definitions", &names[0]], format!("{circle} are defined by one another"));
+            let error =
+                EquationError::at(&["definitions", &parsed[*first].0], format!("{circle} are defined by one another"));
             return Err(error.hint("a definition may use those that do not need it; what remembers is a state"));
         };
-        ordered.push(waiting.remove(next));
+        waiting.remove(&next);
+        for needed in &mut needs {
+            needed.remove(&next);
+        }
+        ordered.push(parsed[next].clone());
     }
     Ok(ordered)
 }
@@ -266,14 +287,14 @@ fn compile(
     definitions: &[(String, Expression)],
     expressions: &[(&str, Expression)],
 ) -> Result<Program, EquationError> {
-    let known: Vec<String> =
-        fixed.iter().chain(varying).cloned().chain(definitions.iter().map(|(name, _)| name.clone())).collect();
+    let all = || fixed.iter().chain(varying).chain(definitions.iter().map(|(name, _)| name));
+    let known: HashSet<&str> = all().map(String::as_str).collect();
     let in_definitions = definitions.iter().map(|(name, expression)| ("definitions", name.as_str(), expression));
     let in_section = expressions.iter().map(|(name, expression)| (section, *name, expression));
     for (section, own, expression) in in_definitions.chain(in_section) {
-        if let Some(unknown) = expression.names().into_iter().find(|name| !known.iter().any(|other| other == name)) {
+        if let Some(unknown) = expression.names().into_iter().find(|name| !known.contains(name)) {
             let error = EquationError::at(&[section, own], format!("nothing is called `{unknown}`"));
-            return Err(error.unknown(unknown, &known));
+            return Err(error.unknown(unknown, all()));
         }
     }
     let bodies: Vec<&Expression> = expressions.iter().map(|(_, expression)| expression).collect();
@@ -287,24 +308,20 @@ fn check_seen(
     definitions: &[(String, Expression)],
     outputs: &[(&str, Expression)],
 ) -> Result<Vec<(String, Expression)>, EquationError> {
-    let driven = |expression: &Expression, driven: &[String]| {
-        let names: Vec<String> = expression.names().into_iter().map(str::to_owned).collect();
-        names.into_iter().find(|n| n == "t" || driven.contains(n) || system.inputs.iter().any(|i| i.name == *n))
-    };
-    // Definitions that an input drives, which therefore no output may use.
-    let mut by_inputs: Vec<String> = Vec::new();
+    // What outputs may not use: inputs, the time, and the definitions that these drive.
+    let mut driven: HashSet<&str> = system.inputs.iter().map(|input| input.name.as_str()).chain(["t"]).collect();
     for (name, expression) in definitions {
-        if driven(expression, &by_inputs).is_some() {
-            by_inputs.push(name.clone());
+        if expression.names().iter().any(|own| driven.contains(own)) {
+            driven.insert(name);
         }
     }
     for (name, expression) in outputs {
-        if let Some(found) = driven(expression, &by_inputs) {
+        if let Some(found) = expression.names().into_iter().find(|own| driven.contains(own)) {
             let error = EquationError::at(&["outputs", name], format!("an output cannot depend on `{found}`"));
             return Err(error.hint("a row is observed before its inputs have acted: outputs are of states and parameters"));
         }
     }
-    Ok(definitions.iter().filter(|(name, _)| !by_inputs.contains(name)).cloned().collect())
+    Ok(definitions.iter().filter(|(name, _)| !driven.contains(name.as_str())).cloned().collect())
 }
 
 fn moving(
@@ -334,9 +351,10 @@ fn moving(
     let inertia = parse(&["attach", "inertia"], &attach.inertia)?;
     // Of the definitions, those that depend on parameters alone.
     let mut lasting: Vec<(String, Expression)> = Vec::new();
+    let mut known: HashSet<&str> = parameters.iter().map(String::as_str).collect();
     for (name, expression) in definitions {
-        let known = |n: &&str| parameters.iter().any(|p| p == n) || lasting.iter().any(|(own, _)| own == n);
-        if expression.names().iter().all(known) {
+        if expression.names().iter().all(|own| known.contains(own)) {
+            known.insert(name);
             lasting.push((name.clone(), expression.clone()));
         }
     }
