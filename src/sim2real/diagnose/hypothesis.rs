@@ -6,6 +6,11 @@ use super::whiteness::{ChannelMisfit, channel_misfits};
 use crate::sim2real::identify::{Block, Effort, Fit, Problem, State, fit};
 use crate::sim2real::{Candidate, Parameter, Part, Seed, Twin};
 
+/// A mean squared residual of at most this many times the noise ...
+const AT_THE_NOISE: f64 = 1.1;
+/// ... and an autocorrelation time below this [rows] are those of noise.
+const NEARLY_WHITE: f64 = 1.5;
+
 /// The twin with the mechanisms numbered in `added`, and its fit.
 #[derive(Debug, Clone)]
 pub struct Hypothesis<T> {
@@ -30,6 +35,11 @@ impl<T> Hypothesis<T> {
     /// Number of free parameters.
     pub(super) fn free(&self) -> usize {
         self.fit.free.len()
+    }
+
+    /// Whether what is left looks like the noise in size and is as white.
+    pub(super) fn leaves_nothing(&self) -> bool {
+        self.misfits.iter().all(|m| m.within(AT_THE_NOISE, 1.0) && m.autocorrelation_time < NEARLY_WHITE)
     }
 
     /// Whether the mean square of what is left is at most `times` that of the noise, whatever its colour.

@@ -216,12 +216,15 @@ fn selected<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> (Selec
         progress("looking for rivals", 0, 1);
         let (selection, rivals) = rivals::settled(&coarse, selection);
         let best = &selection.selected;
-        if gates::moved(&best.twin, &best.fit.values, inquiry.evidence, step, gates::own_step(inquiry.twin)) < gates::SETTLED
-        {
-            progress("fitting with the twin's own step", 0, 1);
-            let refitted = selection.refitted(inquiry);
-            let same = refitted.selected.added == selection.selected.added;
-            return if same { (refitted, rivals) } else { rivals::settled(inquiry, refitted) };
+        let moved = gates::moved(&best.twin, &best.fit.values, inquiry.evidence, step, gates::own_step(inquiry.twin));
+        progress("fitting with the twin's own step", 0, 1);
+        let refitted = selection.refitted(inquiry);
+        if moved < gates::SETTLED && refitted.selected.added == selection.selected.added {
+            return (refitted, rivals);
+        }
+        let (refitted, rivals) = rivals::settled(inquiry, refitted);
+        if moved < gates::SETTLED || refitted.complete() {
+            return (refitted, rivals);
         }
     }
     let selection = select::select(inquiry, inquiry.recalibrated(), progress);

@@ -79,12 +79,13 @@ pub(super) fn select<T: Twin>(
         if !promising {
             break;
         }
-        // The best alone may be the wrong one to build on; what explains far less is not the right one either.
+        // The best alone may be the wrong one to build on, unless it leaves nothing; what explains far less is not the right
+        // one either.
         let best = children[0].clone();
         let far = FAR_BEHIND * gain(inquiry, &beam[0], &best).max(0.0);
         beam = children
             .into_iter()
-            .take(BEAM)
+            .take(if best.leaves_nothing() { 1 } else { BEAM })
             .filter(|child| lead(inquiry, &recalibrated, &best, child) <= far.max(ACCEPT))
             .collect();
     }
@@ -295,11 +296,12 @@ fn chosen<T: Twin>(
     let effective: f64 = parent.misfits.iter().map(ChannelMisfit::effective).sum();
     // Residuals that are white hold all the evidence there is; others may hold more once more is explained.
     let whole: f64 = parent.misfits.iter().map(|m| m.count as f64).sum();
-    let doubt = (BENEFIT_OF_DOUBT * effective).min(whole.max(effective));
+    let (benefit, always) = if parent.leaves_nothing() { (1.0, 0) } else { (BENEFIT_OF_DOUBT, ALWAYS_FITTED) };
+    let doubt = (benefit * effective).min(whole.max(effective));
     let needed = needed_share(first, parent);
     let hopeful = |score: f64| {
         let explained = score * score;
-        -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && BENEFIT_OF_DOUBT * explained > needed
+        -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && benefit * explained > needed
     };
     let all = parent.added.is_empty() && !parent.within(HARDLY_ABOVE);
     let most = if place == 0 { FITTED } else { FITTED / 2 };
@@ -309,7 +311,7 @@ fn chosen<T: Twin>(
         .enumerate()
         .map(|(rank, one)| {
             let name = inquiry.candidates[one.number].about.name;
-            let promising = all || one.score > 0.0 && (rank < ALWAYS_FITTED || hopeful(one.score));
+            let promising = all || one.score > 0.0 && (rank < always || hopeful(one.score));
             if !one.excited || !promising || mechanisms.contains(&name) {
                 return false;
             }
@@ -411,9 +413,9 @@ pub(super) fn share<T>(first: &Hypothesis<T>, other: &Hypothesis<T>, better: &Hy
 /// Whether `whole` explains enough more than `less`, in enough rows.
 fn needed<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, less: &Hypothesis<T>, whole: &Hypothesis<T>) -> bool {
     let enough = whole.added.len() == 1
-        || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), whole)| {
-            let explained = less.sum_of_squares - whole.sum_of_squares;
-            let (all, left) = (above_noise(first, whole.level), above_noise(less, whole.level));
+        || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), last)| {
+            let explained = less.sum_of_squares - last.sum_of_squares;
+            let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
             explained >= share_of(whole.added.len()) * all || explained >= COMPLETES * left
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
