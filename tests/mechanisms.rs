@@ -140,6 +140,11 @@ fn stribeck(x: State, u: f64, fading: f64) -> Forces {
     rubbing(x, u, 0.15 + 0.1 * fading)
 }
 
+/// A shaft of 20 N m/rad that is twice as stiff at 0.03 rad.
+fn hardening(twist: f64, rate: f64) -> f64 {
+    20.0 * twist * (1.0 + (twist / 0.03).powi(2)) + 0.1 * (20.0 * 0.24 * INERTIA).sqrt() * rate
+}
+
 fn bouc_wen(x: State, u: f64, torque: f64, angle: f64, n: i32) -> Forces {
     let (w, v) = (x[2], x[1]);
     let rate = (v - 0.5 * v.abs() * w.abs().powi(n - 1) * w - 0.5 * v * w.abs().powi(n)) / angle;
@@ -303,6 +308,35 @@ const CASES: &[Case] = &[
                 more: [x[3], (transmitted - GRAVITY * x[2].sin()) / (0.4 * INERTIA)],
             }
         },
+        most: 1e-4,
+    },
+    Case {
+        mechanism: "compliance",
+        form: "on_link_hardening",
+        values: &[1.0 / 20.0, 0.6, 0.05, 0.03],
+        law: |_, x, u| motor_and_link(x, u, 0.6, 0.0, hardening(x[2] - x[0], x[3] - x[1])),
+        most: 2e-4,
+    },
+    Case {
+        mechanism: "compliance",
+        form: "on_motor_hardening",
+        values: &[1.0 / 20.0, 0.4, 0.05, 0.03],
+        law: |_, x, u| {
+            let transmitted = hardening(x[0] - x[2], x[1] - x[3]);
+            Forces {
+                net: u - VISCOUS * x[1] - transmitted,
+                inertia: 0.6 * INERTIA,
+                dry: 0.0,
+                more: [x[3], (transmitted - GRAVITY * x[2].sin()) / (0.4 * INERTIA)],
+            }
+        },
+        most: 2e-4,
+    },
+    Case {
+        mechanism: "coulomb_friction",
+        form: "presliding",
+        values: &[0.2, 0.02],
+        law: |_, x, u| bouc_wen(x, u, 0.2, 0.02, 1),
         most: 1e-4,
     },
     Case {

@@ -75,6 +75,8 @@ pub struct Signs {
     pub repeated: f64,
     /// Mean number of repeats in a row.
     pub run: f64,
+    /// The steps in which the first channel is counted, in its unit, where they are no smaller than the noise; 0 elsewhere.
+    pub step: f64,
 }
 
 /// One way to state a mechanism: a law and the parameters it has.

@@ -8,10 +8,12 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site,
 /// Motor and link, held together by a spring that gives by `compliance` and by a damper of `damping_ratio` times the
 /// critical damping of the two against each other. The motor is driven and has the joint's viscous friction, gravity pulls
 /// at the link. In the form `on_motor` the encoder is on the motor and the link has `link_share` of the inertia; in the form
-/// `on_link` the encoder is on the link and the motor has `motor_share`.
+/// `on_link` the encoder is on the link and the motor has `motor_share`. In the forms that end in `_hardening` the spring gets
+/// stiffer as it twists, and is twice as stiff at `hardening_twist`: torque (1 + (twist / hardening_twist)^2).
 ///
 /// Source: Spong, "Modeling and control of elastic joint robots", ASCE Journal of Dynamic Systems, Measurement, and Control
-/// 109 (1987); De Luca & Book, "Robots with flexible elements", *Springer Handbook of Robotics* (2016), section 11.1.
+/// 109 (1987); De Luca & Book, "Robots with flexible elements", *Springer Handbook of Robotics* (2016), section 11.1; a cubic
+/// stiffness of harmonic drives, Tuttle & Seering, IEEE Transactions on Robotics and Automation 12 (1996).
 #[derive(Debug, Clone, Copy)]
 pub struct Compliance;
 
@@ -29,18 +31,24 @@ impl<P: Mover> Mechanism<P> for Compliance {
     }
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
-        let parameters = |share| {
+        let parameters = |share, hardening: bool| {
             // Deflections under the usual effort, as fractions of the usual motion.
             let starts = [0.005, 0.03, 0.2].map(|fraction| fraction * typical.output / typical.effort.max(1e-12));
-            vec![
+            let twist = Parameter::new("hardening_twist", "rad", f64::INFINITY)
+                .within(1e-6 * typical.output.min(1.0), f64::INFINITY)
+                .starting_at(&[0.1 * typical.output]);
+            let linear = [
                 Parameter::new("compliance", "rad/(N m)", 0.0).within(0.0, f64::INFINITY).starting_at(&starts),
                 Parameter::new(share, "", 0.5).within(0.02, 0.98).starting_at(&[0.3, 0.8]),
                 Parameter::new("damping_ratio", "", 0.0).within(0.0, 5.0).starting_at(&[0.05]),
-            ]
+            ];
+            linear.into_iter().chain(hardening.then_some(twist)).collect()
         };
         vec![
-            Form { name: "on_motor", parameters: parameters("link_share") },
-            Form { name: "on_link", parameters: parameters("motor_share") },
+            Form { name: "on_motor", parameters: parameters("link_share", false) },
+            Form { name: "on_link", parameters: parameters("motor_share", false) },
+            Form { name: "on_motor_hardening", parameters: parameters("link_share", true) },
+            Form { name: "on_link_hardening", parameters: parameters("motor_share", true) },
         ]
     }
 
@@ -49,9 +57,10 @@ impl<P: Mover> Mechanism<P> for Compliance {
             compliance: thetas.row(0).to_vec(),
             share: thetas.row(1).to_vec(),
             damping_ratio: thetas.row(2).to_vec(),
+            hardening_twist: if form < 2 { vec![f64::INFINITY; thetas.lanes()] } else { thetas.row(3).to_vec() },
             second: vec![None; thetas.lanes()],
         };
-        if form == 0 { Box::new(OnMotor(shaft)) } else { Box::new(OnLink(shaft)) }
+        if form % 2 == 0 { Box::new(OnMotor(shaft)) } else { Box::new(OnLink(shaft)) }
     }
 }
 
@@ -60,6 +69,8 @@ struct Shaft {
     /// Of the inertia, that of the mass without an encoder.
     share: Vec<f64>,
     damping_ratio: Vec<f64>,
+    /// Where it is twice as stiff; infinite where it is as stiff everywhere.
+    hardening_twist: Vec<f64>,
     second: Vec<Option<SecondMass>>,
 }
 
@@ -100,7 +111,7 @@ impl Shaft {
                 None => {
                     // At first the shaft is bent as it is where both move as one.
                     let (on_first, on_second) = at_rest(lane, state);
-                    let bent = as_one(share, on_first, on_second) * compliance;
+                    let bent = twist(as_one(share, on_first, on_second) * compliance, self.hardening_twist[lane]);
                     self.second[lane].insert(SecondMass::starting(Motion { position: first.position - bent, ..first }))
                 }
             };
@@ -109,9 +120,11 @@ impl Shaft {
             let rate = first.velocity - second.motion.velocity;
             let bend = first.position + half * first.velocity - midway;
             let damping = 2.0 * self.damping_ratio[lane] * (stiffness * reduced).sqrt();
+            let harder = (bend / self.hardening_twist[lane]).powi(2);
+            let tangent = stiffness * (1.0 + 3.0 * harder);
             let coupling = Coupling {
-                effort: stiffness * bend + damping * rate,
-                rate: 0.5 * damping + spring_inertia(stiffness, reduced, tick.step) / tick.step,
+                effort: stiffness * (1.0 + harder) * bend + damping * rate,
+                rate: 0.5 * damping + spring_inertia(tangent, reduced, tick.step) / tick.step,
             };
             let sides = sides(lane, state, midway);
             let load = Load { inertia: share * whole, effort: sides.second, damping: sides.damping, dry_friction: 0.0 };
@@ -122,6 +135,14 @@ impl Shaft {
             push.damping -= sides.damping;
         }
     }
+}
+
+/// The twist of a hardening spring under what would twist it by `linear` if it did not harden, by Newton's method.
+fn twist(linear: f64, doubling: f64) -> f64 {
+    (0..20).fold(linear, |x, _| {
+        let harder = (x / doubling).powi(2);
+        x - (x * (1.0 + harder) - linear) / (1.0 + 3.0 * harder)
+    })
 }
 
 struct OnMotor(Shaft);

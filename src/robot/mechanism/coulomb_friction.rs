@@ -1,5 +1,6 @@
 //! Dry friction: the same against slow motion as against fast, and enough to hold the joint where it is.
 
+use super::Hysteresis;
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
@@ -7,15 +8,19 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site,
 ///
 /// In the form `creeping`, it creeps while it holds, as contacts of rigid-body engines do
 /// ([`Push::creeping_friction`](crate::robot::Push)); in the form `smooth` it is `-smooth_torque tanh(v / velocity)` and holds
-/// nothing.
+/// nothing; in the form `presliding` it gives before it slips, and is `presliding_torque w` with `w' = (v - |v| w) /
+/// presliding_angle`: what bends further before it slips is a [`Hysteresis`].
 ///
 /// Source: Coulomb, *Théorie des machines simples* (1785); Armstrong-Hélouvry, Dupont & Canudas de Wit, "A survey of
 /// models, analysis tools and compensation methods for the control of machines with friction", Automatica 30 (1994);
 /// creeping: Todorov, "Convex and analytically invertible dynamics with contacts and constraints", ICRA 2014; smooth:
 /// Andersson, Söderberg & Björklund, "Friction models for sliding dry, boundary and mixed lubricated contacts", Tribology
-/// International 40 (2007).
+/// International 40 (2007); presliding: Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14 (1976).
 #[derive(Debug, Clone, Copy)]
 pub struct CoulombFriction;
+
+/// The part of the usual motion over which dry friction gives at the most before it slips.
+pub(super) const PRESLIDING: f64 = 0.05;
 
 impl<P: Mover> Mechanism<P> for CoulombFriction {
     fn about(&self) -> About {
@@ -37,18 +42,36 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
         let velocity = Parameter::new("velocity", "rad/s", rate)
             .within(1e-4 * rate.min(1.0), f64::INFINITY)
             .starting_at(&[0.02, 0.2].map(|fraction| fraction * rate));
+        let output = typical.output.max(1e-9);
+        let angle = Parameter::new("presliding_angle", "rad", 0.01 * output)
+            .within(1e-4 * output.min(1.0), f64::INFINITY)
+            .starting_at(&[0.01 * output]);
         vec![
             Form { name: "dry", parameters: vec![torque("torque")] },
             Form { name: "creeping", parameters: vec![torque("creeping_torque")] },
             Form { name: "smooth", parameters: vec![torque("smooth_torque"), velocity] },
+            Form { name: "presliding", parameters: vec![torque("presliding_torque"), angle] },
         ]
     }
 
-    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+    /// A friction that gives over more than a small part of the motion goes by another name.
+    fn sought(&self, typical: &Typical) -> Vec<Form> {
+        let mut forms = Mechanism::<P>::forms(self, typical);
+        for parameter in forms.iter_mut().flat_map(|form| &mut form.parameters) {
+            if parameter.name == "presliding_angle" {
+                parameter.upper = PRESLIDING * typical.output;
+            }
+        }
+        forms
+    }
+
+    fn law(&self, form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<P>> {
         let torque = thetas.row(0).to_vec();
         match form {
             0 => Box::new(Dry(torque)),
             1 => Box::new(Creeping(torque)),
+            // Dahl's law is that of a soft loop.
+            3 => Hysteresis.law(0, thetas, seed),
             _ => Box::new(Smooth { torque, velocity: thetas.row(1).to_vec() }),
         }
     }

@@ -1,5 +1,6 @@
 //! A restoring torque that remembers where it came from: bending cables, rubber, presliding in gears.
 
+use super::coulomb_friction::PRESLIDING;
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
@@ -30,7 +31,7 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
         let parameters = |angle| {
             let torques = [0.1].map(|fraction| fraction * typical.effort);
             let output = typical.output.max(1e-9);
-            let angles = [0.03, 0.2, 0.8].map(|fraction| fraction * output);
+            let angles = [0.07, 0.2, 0.8].map(|fraction| fraction * output);
             vec![
                 Parameter::new("torque", "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&torques).proportional(),
                 Parameter::new(angle, "rad", output).within(1e-4 * output.min(1.0), f64::INFINITY).starting_at(&angles),
@@ -40,6 +41,18 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
             Form { name: "soft", parameters: parameters("yield_angle") },
             Form { name: "sharp", parameters: parameters("sharp_yield_angle") },
         ]
+    }
+
+    /// What slips after a small part of the motion is dry friction.
+    fn sought(&self, typical: &Typical) -> Vec<Form> {
+        let mut forms = Mechanism::<P>::forms(self, typical);
+        for parameter in forms.iter_mut().flat_map(|form| &mut form.parameters) {
+            if parameter.name.ends_with("yield_angle") {
+                parameter.lower = PRESLIDING * typical.output;
+                parameter.starts.retain(|start| *start >= parameter.lower);
+            }
+        }
+        forms
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

@@ -158,7 +158,12 @@ impl<T: Twin> Inquiry<'_, T> {
 
     /// How each candidate that `parent` does not have yet would do, by its signature.
     pub fn screened(&self, parent: &Hypothesis<T>) -> Vec<Screened> {
-        signatures(self, parent)
+        signatures(self, parent, |_| true)
+    }
+
+    /// The same of the candidates that are `wanted` alone.
+    pub fn screened_among(&self, parent: &Hypothesis<T>, wanted: impl Fn(&Candidate) -> bool + Sync) -> Vec<Screened> {
+        signatures(self, parent, wanted)
     }
 }
 

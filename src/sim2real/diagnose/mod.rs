@@ -2,7 +2,8 @@
 //!
 //! One file a step, in this order: `evidence` divides the recordings and finds their `noise`; a `hypothesis` is the
 //! twin with mechanisms added, and the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
-//! by their signatures; `select` fits and compares sets of them, by the evidence that `whiteness` counts; `rivals`
+//! by their signatures; `select` fits and compares sets of them, by the evidence that `whiteness` counts, and
+//! `forms` each in the form that does best beside the others; `rivals`
 //! looks for other names; `remainder` asks what is left, and `structure` what it depends on; `prove` measures errors on what was held out; `verdict` weighs it
 //! all, and `words` tells it. `locate` and `onset` say where and since when the twin is off, `activity` when what was named
 //! acted, and `experiment` designs, from the commands of `excitation`, what to record where rivals are left.
@@ -13,6 +14,7 @@ mod diagnosis;
 mod evidence;
 mod excitation;
 mod experiment;
+mod forms;
 mod gates;
 mod hypothesis;
 mod locate;
@@ -47,7 +49,7 @@ use rivals::Place;
 use select::Selection;
 
 use super::identify::Fit;
-use super::{ChannelWeight, Clock, Parameter, Recording, Seed, Twin};
+use super::{Candidate, ChannelWeight, Clock, Parameter, Recording, Seed, Twin};
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
@@ -126,7 +128,7 @@ pub fn diagnose<T: Twin>(
     let signs = recognize::signs(twin, recordings);
     let found = Found { signs, of: twin.recognized(&signs) };
     let quiet = twin.quiet();
-    if found.of.is_empty() {
+    if signs.repeated <= 0.0 {
         return followed(&quiet, recordings, held_out, &found, seed, progress);
     }
     let channel = twin.channels().first().map(|c| c.name.clone()).unwrap_or_default();
@@ -137,7 +139,7 @@ pub fn diagnose<T: Twin>(
 /// What the recordings show by themselves.
 pub(super) struct Found {
     signs: super::Signs,
-    of: Vec<super::Candidate>,
+    of: Vec<Candidate>,
 }
 
 /// The same of a twin that is followed, beside what was found without following it.
@@ -183,7 +185,10 @@ fn followed<T: Twin>(
         sampled: twin.clock() != Clock::Event,
     };
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
-    verdict::recognized(&mut diagnosis, &inquiry, found);
+    // What the fit has named already need not be recognized besides.
+    let named: Vec<&str> = selection.selected.added.iter().map(|number| candidates[*number].about.name).collect();
+    let seen: Vec<&Candidate> = found.of.iter().filter(|c| !named.contains(&c.about.name)).collect();
+    verdict::recognized(&mut diagnosis, &inquiry, &found.signs, &seen);
     progress("saying where", 0, 1);
     let covariates = locate::covariates(&inquiry);
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
@@ -197,7 +202,7 @@ fn followed<T: Twin>(
         excitation
     });
     let (mut trued_twin, mut values, mut std) = (selection.selected.twin, trued.values, findings.std);
-    for candidate in &found.of {
+    for candidate in seen {
         trued_twin = trued_twin.with(candidate);
         values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
         std.resize(values.len(), 0.0);

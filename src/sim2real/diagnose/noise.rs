@@ -39,7 +39,7 @@ fn floor<S: Simulator>(simulator: &S, recording: &Recording<S::Stimulus>, measur
 ///
 /// Differencing removes polynomials up to the third degree; white noise of variance 1 leaves a variance of
 /// 1 + 16 + 36 + 16 + 1 = 70. Source: the difference-based estimators of Hall, Kay & Titterington, Biometrika 77 (1990).
-fn fourth_difference(samples: &[Option<f64>]) -> f64 {
+pub(super) fn fourth_difference(samples: &[Option<f64>]) -> f64 {
     let differences: Vec<f64> = samples
         .windows(5)
         .filter_map(|w| match w {

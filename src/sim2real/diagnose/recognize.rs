@@ -4,9 +4,10 @@
 //! sample that repeats the one before to the last bit, of a signal that never does so otherwise, is no sample.
 
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::noise::fourth_difference;
 use super::rivals::Place;
 use super::select::{ACCEPT, Selection, gain};
-use crate::sim2real::{Candidate, Measured, Recording, Signs, Simulator, Twin};
+use crate::sim2real::{Candidate, Clock, Measured, Recording, Signs, Simulator, Twin};
 
 /// Rounding the simulated signal must leave at most this part of the squared residual.
 const LEFT: f64 = 0.7;
@@ -34,22 +35,30 @@ pub(super) fn finished<T: Twin>(
     selection
 }
 
+/// Steps count as visible where their rounding makes at least this part of the scatter of neighbouring rows.
+const VISIBLE: f64 = 0.3;
+
 /// What the measured channels themselves show.
 pub(super) fn signs<T: Simulator>(twin: &T, recordings: &[Recording<T::Stimulus>]) -> Signs {
+    let Some(channel) = twin.channels().first().filter(|_| twin.clock() != Clock::Event) else { return Signs::default() };
     let (mut samples, mut repeated, mut runs) = (0, 0, 0);
-    let Some(channel) = twin.channels().first() else { return Signs::default() };
+    let mut step = f64::INFINITY;
     for recording in recordings {
         let Some(measured) = recording.channel(&channel.name) else { continue };
-        let stale = stale(measured, twin.resolution(recording, &channel.name));
+        let resolution = twin.resolution(recording, &channel.name);
+        let visible = resolution >= VISIBLE * fourth_difference(&measured.samples);
+        step = step.min(if visible { resolution * 12.0_f64.sqrt() } else { 0.0 });
+        let stale = stale(measured, resolution);
         samples += stale.len();
         repeated += stale.iter().filter(|s| **s).count();
         runs += stale.iter().zip(std::iter::once(&false).chain(&stale)).filter(|(now, before)| **now && !**before).count();
     }
+    let counted = Signs { step: if step.is_finite() { step } else { 0.0 }, ..Signs::default() };
     // A signal that hardly ever changes has nothing to lose.
     if repeated < FEWEST || 2 * repeated > samples {
-        return Signs::default();
+        return counted;
     }
-    Signs { repeated: repeated as f64 / samples as f64, run: repeated as f64 / runs.max(1) as f64 }
+    Signs { repeated: repeated as f64 / samples as f64, run: repeated as f64 / runs.max(1) as f64, ..counted }
 }
 
 /// A run of equal samples counts as lost where fewer than this many as long are to be expected by chance ...

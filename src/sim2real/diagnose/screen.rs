@@ -34,11 +34,15 @@ pub(super) struct Screened {
     pub signature: DVector<f64>,
 }
 
-/// Screens every candidate that `parent` does not have.
+/// Screens every candidate that is `wanted` and that `parent` does not have.
 ///
 /// A refit that had to do without a mechanism has been bent by it, sometimes out of all likeness: the twin with its
 /// parameters as given is looked at too, where nothing has been added yet.
-pub(super) fn signatures<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>) -> Vec<Screened> {
+pub(super) fn signatures<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    parent: &Hypothesis<T>,
+    wanted: impl Fn(&Candidate) -> bool + Sync,
+) -> Vec<Screened> {
     let mut grounds = vec![Ground::new(inquiry, parent, &parent.fit.values)];
     if parent.added.is_empty() && parent.misfits.iter().any(|m| m.sum_of_squares > BENT * m.count as f64) {
         let given: Vec<f64> = parent.twin.parameters().iter().map(|p| p.nominal).collect();
@@ -47,7 +51,7 @@ pub(super) fn signatures<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<
     let has: Vec<&str> = parent.added.iter().map(|n| inquiry.candidates[*n].about.name).collect();
     (0..inquiry.candidates.len())
         .into_par_iter()
-        .filter(|number| !inquiry.candidates[*number].finishing)
+        .filter(|number| !inquiry.candidates[*number].finishing && wanted(&inquiry.candidates[*number]))
         .filter(|number| !has.contains(&inquiry.candidates[*number].about.name))
         .filter_map(|number| screen(inquiry, parent, number, &grounds))
         .collect()

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::forms::reformed;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
@@ -69,8 +70,11 @@ pub(super) fn select<T: Twin>(
     let mut best_of_stage: Vec<Hypothesis<T>> = Vec::new();
     for stage in 0..STAGES {
         progress("comparing mechanisms", stage, STAGES);
-        let (children, tried) = expand(inquiry, &recalibrated, &beam, stage);
+        let (mut children, tried) = expand(inquiry, &recalibrated, &beam, stage);
         scores.extend(tried);
+        if let Some(best) = children.first_mut().filter(|best| stage > 0 && !best.leaves_nothing()) {
+            *best = reformed(inquiry, &recalibrated, best);
+        }
         let Some(best) = children.first().cloned() else { break };
         let parent = best_of_stage.last().unwrap_or(&recalibrated);
         let left = !best.within(ABOVE_NOISE);
@@ -374,6 +378,10 @@ fn pruned<T: Twin>(
         }
         let mut without: Vec<Hypothesis<T>> =
             (0..whole.added.len()).into_par_iter().map(|i| inquiry.without(&whole, i)).collect();
+        // Of three, one may stand for what two leave in the wrong form.
+        if whole.added.len() > 2 {
+            without = without.par_iter().map(|less| reformed(inquiry, recalibrated, less)).collect();
+        }
         if let [alone] = without.as_mut_slice() {
             if squares(alone) < squares(&bare) {
                 bare = alone.clone();

@@ -11,9 +11,9 @@ use super::remainder::AT_THE_NOISE;
 use super::rivals::Place;
 use super::select::Selection;
 use super::structure::Dependence;
-use super::{Found, whiteness, words};
+use super::{whiteness, words};
 use crate::sim2real::identify::Fit;
-use crate::sim2real::{Clock, Twin};
+use crate::sim2real::{Candidate, Clock, Signs, Twin};
 
 /// A remainder above this part of the first misfit is more than an error of form.
 const FORM_ERROR: f64 = 0.10;
@@ -100,22 +100,26 @@ pub(super) fn diagnosis<T: Twin>(
 }
 
 /// Adds what the recordings show by themselves.
-pub(super) fn recognized<T: Twin>(diagnosis: &mut Diagnosis, inquiry: &Inquiry<'_, T>, found: &Found) {
-    let titles: Vec<&str> = found.of.iter().map(|c| c.about.title).collect();
-    if titles.is_empty() {
+pub(super) fn recognized<T: Twin>(diagnosis: &mut Diagnosis, inquiry: &Inquiry<'_, T>, signs: &Signs, found: &[&Candidate]) {
+    if found.is_empty() {
         return;
     }
-    let told = format!(
-        "{}: {:.1} % of the samples repeat the one before to the last bit, and were taken for lost",
-        titles.join(", "),
-        100.0 * found.signs.repeated
-    );
+    let unit = inquiry.twin.unit("output");
+    let of_signs = [
+        (signs.repeated > 0.0).then(|| {
+            let share = 100.0 * signs.repeated;
+            format!("{share:.1} % of the samples repeat the one before to the last bit, and were taken for lost")
+        }),
+        (signs.step > 0.0).then(|| format!("the sensor counts in steps of {} {unit}", words::figure(signs.step, 3))),
+    ];
+    let told = of_signs.into_iter().flatten().collect::<Vec<_>>().join("; ");
     if diagnosis.verdict == Verdict::NoMismatch {
         diagnosis.verdict = Verdict::Named;
-        diagnosis.summary = format!("The recordings show {told}; for the rest the {} explains them.", inquiry.twin.name());
+        diagnosis.summary =
+            format!("The recordings show that {told}; for the rest the {} explains them.", inquiry.twin.name());
     }
     diagnosis.checks.notes.push(told);
-    diagnosis.effects.extend(found.of.iter().map(|candidate| {
+    diagnosis.effects.extend(found.iter().map(|candidate| {
         Effect {
             mechanism: candidate.about.name.to_owned(),
             site: candidate.about.site,

@@ -4,7 +4,7 @@ use super::decay::Decay;
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `time_constant du/dt = u_command - u`; in the form `two_stage`, two such lags of half of `total_time` each, one after the
-/// other: a filter, then a winding.
+/// other: a filter, then a winding; in the form `two_poles` the two have each a time constant of its own.
 ///
 /// Each stage is solved exactly over a tick for a command that holds; what the next gets is the mean over the tick.
 ///
@@ -21,7 +21,7 @@ where
             name: "actuator_lag",
             site: Site::Command,
             title: "a lag of the actuator",
-            law: "time_constant du/dt = u_command - u; two_stage: twice, with half of total_time each",
+            law: "time_constant du/dt = u_command - u; two_stage: twice, with half of total_time each; two_poles: twice",
             source: "Åström & Murray, Feedback Systems (2021), 3.3",
             remedy: "measure the actuator's step response; add the lag to the simulator",
             contains: &[],
@@ -30,16 +30,23 @@ where
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
         let time = |name| Parameter::new(name, "s", 0.0).within(0.0, 2.0).starting_at(&[0.01, 0.05]);
+        let shorter = Parameter::new("fast_time_constant", "s", 0.0).within(0.0, 2.0).starting_at(&[0.005]);
         vec![
             Form { name: "first_order", parameters: vec![time("time_constant")] },
             Form { name: "two_stage", parameters: vec![time("total_time")] },
+            Form { name: "two_poles", parameters: vec![time("slow_time_constant"), shorter] },
         ]
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let stages = form + 1;
-        let time_constant: Vec<f64> = thetas.row(0).iter().map(|time| time / stages as f64).collect();
-        Box::new(Lags(vec![Lag { time_constant, follower: vec![None; thetas.lanes()], decay: Decay::default() }; stages]))
+        let half = || thetas.row(0).iter().map(|time| 0.5 * time).collect();
+        let stages: Vec<Vec<f64>> = match form {
+            0 => vec![thetas.row(0).to_vec()],
+            1 => vec![half(), half()],
+            _ => vec![thetas.row(0).to_vec(), thetas.row(1).to_vec()],
+        };
+        let lag = |time_constant| Lag { time_constant, follower: vec![None; thetas.lanes()], decay: Decay::default() };
+        Box::new(Lags(stages.into_iter().map(lag).collect()))
     }
 }
 
@@ -76,5 +83,29 @@ impl Lag {
                 *u += (start - *u) * gained * tau / tick.step;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wire::shaped;
+    use super::*;
+
+    /// Two poles answer a step by `1 - (a exp(-t/a) - b exp(-t/b)) / (a - b)`, as two lags in a row do, and as one where the
+    /// other is at once.
+    #[test]
+    fn two_poles_answer_as_two_lags_in_a_row() {
+        let (a, b, step) = (0.05, 0.02, 1e-4);
+        let commands: Vec<f64> = (0..2_001).map(|k| if k == 0 { 0.0 } else { 1.0 }).collect();
+        let out = shaped(&ActuatorLag, 2, &[&[a, b], &[b, a], &[a, 0.0]], step, &commands);
+        for k in [101_usize, 501, 1_001, 2_000] {
+            // The mean over a tick of the answer to what began with tick 1.
+            let t = (k as f64 - 0.5) * step;
+            let exact = 1.0 - (a * (-t / a).exp() - b * (-t / b).exp()) / (a - b);
+            assert!((out[0][k] - exact).abs() < 1e-5 && (out[1][k] - exact).abs() < 1e-5, "{k}: {} not {exact}", out[0][k]);
+        }
+        let half = shaped(&ActuatorLag, 1, &[&[2.0 * b]], step, &commands);
+        assert_eq!(half, shaped(&ActuatorLag, 2, &[&[b, b]], step, &commands));
+        assert_eq!(out[2], shaped(&ActuatorLag, 0, &[&[a]], step, &commands)[0]);
     }
 }

@@ -1,6 +1,6 @@
 //! A sensor that counts in steps.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Signs, Site, Thetas, Typical};
 
 /// `y -> round(y / step) step`, on the plant's first channel.
 ///
@@ -34,6 +34,11 @@ where
 
     fn finishing(&self, _form: usize) -> bool {
         true
+    }
+
+    /// A signal that noise moves by about a step is rounded visibly, though no fit can tell to which side.
+    fn recognized(&self, _form: usize, signs: &Signs) -> Option<Vec<f64>> {
+        (signs.step > 0.0).then(|| vec![signs.step])
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
