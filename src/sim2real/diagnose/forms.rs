@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
-use super::select::lead;
+use super::weigh::lead;
 use crate::sim2real::identify::Effort;
 use crate::sim2real::{Candidate, Twin};
 

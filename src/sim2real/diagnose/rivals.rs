@@ -5,7 +5,8 @@ use rayon::prelude::*;
 use super::confidence::by_evidence;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
-use super::select::{SHARE, Selection, completes, gain, lead, share};
+use super::select::Selection;
+use super::weigh::{SHARE, completes, gain, lead, share};
 use crate::sim2real::identify::Effort;
 use crate::sim2real::{About, Candidate, Twin};
 

@@ -1,0 +1,138 @@
+//! Weighing: what the evidence says of one hypothesis beside another.
+
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::whiteness::ChannelMisfit;
+use crate::sim2real::Twin;
+
+/// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
+/// quite the form of the real thing, and what they leave looks like something else ...
+pub(super) const SHARE: f64 = 0.01;
+const SHARE_OF_MORE: f64 = 0.03;
+/// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
+const COMPLETES: f64 = 0.8;
+/// A mechanism must move at least this many rows by more than the noise.
+const INFORMATIVE_ROWS: usize = 25;
+/// Residuals with an autocorrelation time below this [rows] are taken for white.
+const NEARLY_WHITE: f64 = 2.0;
+/// Residuals that differ by less than this part say the same; their numbers of effective residuals differ by more.
+const ALIKE_LEFT: f64 = 0.05;
+
+/// Hypotheses by what the evidence says of them, best first.
+///
+/// Each is weighed with its own number of effective residuals, for the right one leaves whiter ones. But those that leave
+/// nearly as little as the one that leaves least are weighed with the number of that one: their own would rank them by its
+/// scatter.
+pub(super) fn ranked<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    reference: &Hypothesis<T>,
+    all: Vec<Hypothesis<T>>,
+) -> Vec<Hypothesis<T>> {
+    let Some(best) = all.iter().min_by(|a, b| squares(a).total_cmp(&squares(b))).cloned() else { return all };
+    let mut keyed: Vec<(f64, Hypothesis<T>)> =
+        all.into_iter().map(|h| (weighed(inquiry, reference, &h, scale_of(&h, &best)), h)).collect();
+    keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    keyed.into_iter().map(|(_, h)| h).collect()
+}
+
+/// By whose number of effective residuals `one` is weighed beside `best`.
+fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypothesis<T> {
+    if squares(one) <= (1.0 + ALIKE_LEFT) * squares(best) { best } else { one }
+}
+
+/// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other.
+pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
+    let best = if squares(a) <= squares(b) { a } else { b };
+    weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best))
+}
+
+/// The least part of the parent's residual that a further mechanism has to explain to be needed.
+pub(super) fn needed_share<T>(first: &Hypothesis<T>, parent: &Hypothesis<T>) -> f64 {
+    if parent.added.is_empty() {
+        return 0.0;
+    }
+    let least = |(first, left): (&ChannelMisfit, &ChannelMisfit)| {
+        let most = (share_of(parent.added.len() + 1) * above_noise(first, left.level))
+            .min(COMPLETES * above_noise(left, left.level));
+        most / left.sum_of_squares.max(1e-300)
+    };
+    first.misfits.iter().zip(&parent.misfits).map(least).fold(f64::INFINITY, f64::min)
+}
+
+/// The part of the first misfit that the last of so many mechanisms must explain.
+fn share_of(mechanisms: usize) -> f64 {
+    if mechanisms > 2 { SHARE_OF_MORE } else { SHARE }
+}
+
+/// Whether `better` explains nearly all that `other` leaves above noise as white as what `better` leaves.
+pub(super) fn completes<T>(other: &Hypothesis<T>, better: &Hypothesis<T>) -> bool {
+    other.misfits.iter().zip(&better.misfits).any(|(other, better)| {
+        let mean_square = better.sum_of_squares / better.count.max(1) as f64;
+        let white = better.autocorrelation_time < NEARLY_WHITE || better.level > 1.0;
+        let level = if white { mean_square } else { 1.0 };
+        let explained = other.sum_of_squares - better.sum_of_squares;
+        explained > 0.0 && explained >= COMPLETES * other.above(level)
+    })
+}
+
+/// What a misfit has above noise of that level.
+fn above_noise(misfit: &ChannelMisfit, level: f64) -> f64 {
+    misfit.above(level).max(0.1 * misfit.sum_of_squares)
+}
+
+/// Sum of squared residuals of all channels.
+pub(super) fn squares<T>(hypothesis: &Hypothesis<T>) -> f64 {
+    hypothesis.misfits.iter().map(|m| m.sum_of_squares).sum()
+}
+
+/// By what part of the first misfit above the noise `better` explains more than `other`, in the channel where it is most.
+pub(super) fn share<T>(first: &Hypothesis<T>, other: &Hypothesis<T>, better: &Hypothesis<T>) -> f64 {
+    let channels = first.misfits.iter().zip(&other.misfits).zip(&better.misfits);
+    channels
+        .map(|((first, other), better)| {
+            (other.sum_of_squares - better.sum_of_squares) / above_noise(first, better.level).max(1e-300)
+        })
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Whether `whole` explains enough more than `less`, in enough rows.
+pub(super) fn needed<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    less: &Hypothesis<T>,
+    whole: &Hypothesis<T>,
+) -> bool {
+    let enough = whole.added.len() == 1
+        || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), last)| {
+            let explained = less.sum_of_squares - last.sum_of_squares;
+            let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
+            explained >= share_of(whole.added.len()) * all || explained >= COMPLETES * left
+        });
+    let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
+    let moved = (0..rows).filter(|i| (less.fit.residual[*i] - whole.fit.residual[*i]).abs() > 1.0).count();
+    // Effects below the noise show in the sum of many rows only: there, the gain alone decides.
+    let weak = moved == 0 && rows > 40 * INFORMATIVE_ROWS;
+    enough && (weak || moved >= INFORMATIVE_ROWS)
+}
+
+/// `sum N_e ln(RSS0 / RSS1) - dk ln N_e`, with the effective number of residuals of the *alternative*: autocorrelated
+/// noise then does not look like evidence.
+pub(super) fn gain<T: Twin>(inquiry: &Inquiry<'_, T>, null: &Hypothesis<T>, alternative: &Hypothesis<T>) -> f64 {
+    weighed(inquiry, null, alternative, alternative)
+}
+
+/// The same with the effective number of residuals of `scale`.
+fn weighed<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    null: &Hypothesis<T>,
+    alternative: &Hypothesis<T>,
+    scale: &Hypothesis<T>,
+) -> f64 {
+    let mut gain = 0.0;
+    let mut effective = 1.0;
+    for ((null, other), scale) in null.misfits.iter().zip(&alternative.misfits).zip(&scale.misfits) {
+        let rounding = inquiry.evidence.rounding_of(&other.channel).max(1e-9) * other.count as f64;
+        gain += scale.effective() * ((null.sum_of_squares + rounding) / (other.sum_of_squares + rounding)).ln();
+        effective += scale.effective();
+    }
+    gain - (alternative.free() as f64 - null.free() as f64) * effective.ln()
+}
