@@ -245,7 +245,8 @@ fn effects<T: Twin>(
     let mut effects: Vec<Effect> = Vec::new();
     for (number, place) in selected.added.iter().zip(places) {
         let candidate = &inquiry.candidates[*number];
-        let (confidence, others) = if findings.sampled { calibrated(place, unseen) } else { by_evidence(place) };
+        let (confidence, others) =
+            if findings.sampled { calibrated(place, unseen, places.len() - 1) } else { by_evidence(place) };
         let parameters = candidate
             .form
             .parameters
