@@ -200,7 +200,8 @@ fn a_diagnosis_is_printed_written_and_diagnosed_again() {
     );
     assert_eq!((&found["schema"], &found["verdict"]), (&"trueup.diagnosis/1".into(), &"named".into()));
     let effect = &found["effects"][0];
-    assert_eq!(keys(effect), ["active", "confidence", "mechanism", "moved", "parameters", "rivals", "site", "where"]);
+    let known = ["active", "confidence", "gain", "margin", "mechanism", "moved", "parameters", "rivals", "site", "where"];
+    assert_eq!(keys(effect), known);
     assert_eq!((&effect["mechanism"], &effect["site"]), (&"coulomb_friction".into(), &"plant".into()));
     let (_, torque) = effect["parameters"].as_object().unwrap().iter().find(|(name, _)| name.ends_with("torque")).unwrap();
     assert_eq!(keys(torque), ["std", "unit", "value"]);

@@ -10,7 +10,7 @@ use trueup::io::TwinFile;
 use trueup::market::{Execution, execution_twin};
 use trueup::robot::{joint_assembly, joint_recordings};
 use trueup::sim2real::Seed;
-use trueup::sim2real::diagnose::{ChannelFit, Diagnosis, Verdict, diagnose};
+use trueup::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, Verdict, diagnose};
 use trueup::sim2real::{Assembly, Recording};
 
 /// The folder of recordings; none, which is said, where it is not at hand.
@@ -47,13 +47,17 @@ fn the_positioning_axis_has_dry_friction_and_an_offset() {
     let outcome = diagnose(&assembly, &recordings, &held_out, Seed(0), &|_, _, _| {});
     let found = &outcome.diagnosis;
     let fit = fit(found, "position");
-    // The offset is told as a constant load or, worse but no further from the recordings, as a soft stop that it always
-    // leans on: only the friction is sure.
-    assert!(named(found).contains(&"coulomb_friction"), "{}", found.summary);
-    let friction = found.effects.iter().find(|effect| effect.mechanism == "coulomb_friction").unwrap();
-    let torque = friction.parameters["torque"].value;
-    assert!((torque - 20.4).abs() < 1.5, "{torque} N");
-    assert_eq!(found.effects.len(), 2, "{}", found.summary);
+    // Windows tell dry friction, be it with a load or without; of an offset and a gain that is off to one side, which come to
+    // the same where one mostly goes that way, either may be named.
+    let told = |names: &[&str]| {
+        let said = |effect: &Effect| {
+            names.contains(&effect.mechanism.as_str()) || effect.rivals.iter().any(|r| names.contains(&r.mechanism.as_str()))
+        };
+        found.effects.iter().filter(|effect| said(effect)).count()
+    };
+    assert_eq!((told(&["coulomb_friction"]), told(&["constant_load"])), (1, 1), "{}", found.summary);
+    // Its encoder counts in steps far below anything that matters, which is seen.
+    assert!(named(found).contains(&"quantization") && found.effects.len() == 3, "{}", found.summary);
     assert!(fit.nominal_rmse > 0.05 && fit.trued_rmse < 0.007, "{} m, {} m", fit.nominal_rmse, fit.trued_rmse);
     assert!(fit.improvement_ci95[0] > 0.0);
 }

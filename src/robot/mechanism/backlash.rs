@@ -50,8 +50,8 @@ where
             Parameter::new("motor_friction", "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&[0.1 * typical.effort]);
         // What bends by a part of the smallest gap under the usual effort, and by as much as the middle one.
         let firm = [300.0, 30.0].map(|factor| factor * typical.effort / typical.output.max(1e-12));
-        let stiffness = Parameter::new("stiffness", "N m/rad", firm[0]).within(0.0, f64::INFINITY).starting_at(&firm);
-        let ratio = Parameter::new("damping_ratio", "", 0.3).within(0.0, 5.0).starting_at(&[0.3]);
+        let stiffness = Parameter::new("stiffness", "N m/rad", 10.0 * firm[0]).within(0.0, f64::INFINITY).starting_at(&firm);
+        let ratio = Parameter::new("damping_ratio", "", 1.0).within(0.0, 5.0).starting_at(&[0.3]);
         let width = Parameter::new("width", "command", 0.0).within(0.0, f64::INFINITY).starting_at(&widths);
         vec![
             Form { name: "play", parameters: vec![width] },

@@ -43,7 +43,7 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
             .within(1e-4 * rate.min(1.0), f64::INFINITY)
             .starting_at(&[0.02, 0.2].map(|fraction| fraction * rate));
         let output = typical.output.max(1e-9);
-        let angle = Parameter::new("presliding_angle", "rad", 0.01 * output)
+        let angle = Parameter::new("presliding_angle", "rad", 0.05 * output)
             .within(1e-4 * output.min(1.0), f64::INFINITY)
             .starting_at(&[0.01 * output]);
         vec![

@@ -151,6 +151,12 @@ impl<T: Twin> Inquiry<'_, T> {
         fit(&problem, start, &hypothesis.fit.free, &State::estimated(&problem), Effort::Thorough)
     }
 
+    /// What `hypothesis` leaves of the fitted rows in free run, for plants that are compared on windows: what windows do not
+    /// tell apart may go its own ways there.
+    pub fn left_in_free_run(&self, hypothesis: &Hypothesis<T>) -> Option<f64> {
+        self.evidence.window.map(|_| self.in_free_run(hypothesis).objective())
+    }
+
     /// The problem of fitting `twin` to `parts`.
     pub fn problem<'b>(&'b self, twin: &'b T, parts: &'b [Part<'b, T::Stimulus>]) -> Problem<'b, T> {
         Problem { simulator: twin, parts, weights: &self.evidence.weights, seed: self.seed }

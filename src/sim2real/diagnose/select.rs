@@ -20,6 +20,10 @@ const STAGES: usize = 4;
 /// Where a first mechanism alone gains nothing, two may: they are tried while the mean squared residual is this many
 /// times the noise.
 const ABOVE_NOISE: f64 = 1.5;
+/// Of so many hypotheses that come near the best on windows, the one that does best in free run is taken.
+const NEAR_BEST: usize = 4;
+/// What leaves this many times as much in free run as what it builds on is not an explanation, however well it fits windows.
+const STRAYS: f64 = 1.5;
 /// Hypotheses that each stage hands to the next: the best alone may be the wrong one to build on.
 const BEAM: usize = 3;
 /// Mechanisms fitted from the best hypothesis of the beam; from the others half as many.
@@ -66,8 +70,12 @@ pub(super) fn select<T: Twin>(
         if let Some(best) = children.first_mut().filter(|best| stage > 0 && !best.leaves_nothing()) {
             *best = reformed(inquiry, &recalibrated, best);
         }
+        steadiest_first(inquiry, &recalibrated, &mut children);
         let Some(best) = children.first().cloned() else { break };
         let parent = best_of_stage.last().unwrap_or(&recalibrated);
+        if strays(inquiry, parent, &best) {
+            break;
+        }
         let left = !best.within(ABOVE_NOISE);
         let promising = gain(inquiry, parent, &best) > ACCEPT || left && stage == 0;
         best_of_stage.push(best);
@@ -86,6 +94,28 @@ pub(super) fn select<T: Twin>(
     }
     let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
     Selection { recalibrated, selected, without, scores }
+}
+
+/// Puts first, of the hypotheses that come near the best, the one that does best in free run, where windows were compared.
+fn steadiest_first<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, children: &mut [Hypothesis<T>]) {
+    let Some(best) = children.first() else { return };
+    let near = children.iter().take(NEAR_BEST).take_while(|child| lead(inquiry, first, best, child) <= ACCEPT).count();
+    if near < 2 {
+        return;
+    }
+    let left: Vec<Option<f64>> = children[..near].par_iter().map(|child| inquiry.left_in_free_run(child)).collect();
+    let least = left.iter().enumerate().filter_map(|(k, left)| Some((k, (*left)?))).min_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((k, _)) = least {
+        children[..=k].rotate_right(1);
+    }
+}
+
+/// Whether `whole` fits windows better than `less` and a free run much worse.
+fn strays<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, whole: &Hypothesis<T>) -> bool {
+    match (inquiry.left_in_free_run(less), inquiry.left_in_free_run(whole)) {
+        (Some(less), Some(whole)) => whole > STRAYS * less,
+        _ => false,
+    }
 }
 
 impl<T: Twin> Selection<T> {
@@ -147,6 +177,9 @@ impl<T: Twin> Selection<T> {
             });
         let kept = selected.added.len() >= self.selected.added.len();
         let better = lead(inquiry, &recalibrated, &selected, &self.selected) > 0.0;
+        if strays(inquiry, &self.selected, &selected) {
+            return None;
+        }
         (better || simpler && kept).then(|| Self { recalibrated, selected, without, scores: self.scores.clone() })
     }
 }

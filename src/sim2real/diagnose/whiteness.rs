@@ -60,7 +60,10 @@ pub(super) fn channel_misfits(residual: &[f64], blocks: &[Block], rounding: impl
                 sum_of_squares,
                 count,
                 autocorrelation_time: 1.0 + coloured * (time - 1.0),
-                level: if covariance.is_some_and(|c| coloured_like_noise(&c)) { mean_square.max(1.0) } else { 1.0 },
+                level: match covariance {
+                    Some(c) if mean_square < MOST_HIDDEN && coloured_like_noise(&c) => mean_square.max(1.0),
+                    _ => 1.0,
+                },
             }
         })
         .collect()
@@ -93,6 +96,8 @@ const NEAR_LAG: usize = 2;
 const FAR_LAG: usize = 6;
 /// Noise forgets at least this part of itself from one row to the next; a motion is smoother.
 const FORGETS: f64 = 0.045;
+/// Differences of neighbouring rows hide at most this part of the mean square of noise that forgets so fast.
+const MOST_HIDDEN: f64 = 40.0;
 /// Residuals less correlated than this over [`NEAR_LAG`] rows are white enough.
 const WHITE: f64 = 0.1;
 
