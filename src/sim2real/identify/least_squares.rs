@@ -160,8 +160,11 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         self.objective = self.evaluation.objective + self.prior(&self.theta);
     }
 
+    /// What priors add, held against the misfit as it is: beside an error far above the noise they would count for nothing, and
+    /// a twin that lacks something be bent out of all likeness.
     fn prior(&self, theta: &[f64]) -> f64 {
-        self.free.iter().map(|k| prior_penalty(self.problem, *k, theta[*k])).sum()
+        let penalty: f64 = self.free.iter().map(|k| prior_penalty(self.problem, *k, theta[*k])).sum();
+        self.state.misfit.powi(2) * penalty
     }
 
     /// Makes at most `steps` more steps.
@@ -216,7 +219,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let mut information = jacobian.tr_mul(jacobian);
         let mut gradient = jacobian.tr_mul(&self.evaluation.residual);
         for (i, k) in self.free.iter().enumerate() {
-            let weight = prior_weight(self.problem, *k).powi(2);
+            let weight = (self.state.misfit * prior_weight(self.problem, *k)).powi(2);
             information[(i, i)] += weight;
             if weight > 0.0 {
                 gradient[i] += weight * (self.theta[*k] - self.problem.simulator.parameters()[*k].nominal);
@@ -268,7 +271,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let mut information = scaled.tr_mul(&scaled);
         let rank = rank(&information);
         for (i, k) in free.iter().enumerate() {
-            information[(i, i)] += (prior_weight(problem, *k) * scales[i]).powi(2);
+            information[(i, i)] += (state.misfit * prior_weight(problem, *k) * scales[i]).powi(2);
         }
         let covariance = if free.is_empty() { None } else { information.try_inverse() }
             .map(|inverse| DMatrix::from_fn(free.len(), free.len(), |i, j| inverse[(i, j)] * scales[i] * scales[j]));
@@ -278,7 +281,8 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             std[*k] = if variance >= 0.0 { variance.sqrt() } else { f64::INFINITY };
         }
         let at_bound = free.iter().copied().filter(|k| parameters[*k].at_bound(theta[*k])).collect();
-        let prior = free.iter().map(|k| prior_penalty(problem, *k, theta[*k])).sum();
+        let penalty: f64 = free.iter().map(|k| prior_penalty(problem, *k, theta[*k])).sum();
+        let prior = state.misfit.powi(2) * penalty;
         Fit {
             values: theta,
             std,
