@@ -48,7 +48,7 @@ fn every_effect_of_the_generator_is_named() {
     for (k, effect) in ServoEffect::TYPICAL.into_iter().enumerate() {
         let outcome = diagnosed(&twin(), &[effect], 40 + 2 * k as u64);
         // A spring that hardens has two right names: what is left of either is an error of form.
-        let hardening = matches!(effect, ServoEffect::HardeningSpring { .. }) && names(&outcome) == ["cubic_stiffness"];
+        let springs = ["cubic_stiffness", "stiffness"];
         // In open loop and from rest a late command and a late sensor are the same: both must be told.
         let delays = ["command_delay", "observation_delay"];
         if effect.mechanism() == delays[0] {
@@ -59,8 +59,12 @@ fn every_effect_of_the_generator_is_named() {
                 "{:#?}",
                 outcome.diagnosis
             );
+        } else if matches!(effect, ServoEffect::HardeningSpring { .. }) {
+            let named = names(&outcome);
+            assert!(named.len() == 1 && springs.contains(&named[0].as_str()), "{:#?}", outcome.diagnosis);
+            assert!(matches!(outcome.diagnosis.verdict, Verdict::Named | Verdict::Ambiguous));
         } else {
-            assert!(hardening || names(&outcome) == [effect.mechanism()], "{:#?}", outcome.diagnosis);
+            assert_eq!(names(&outcome), [effect.mechanism()], "{:#?}", outcome.diagnosis);
             assert_eq!(outcome.diagnosis.verdict, Verdict::Named, "{}", outcome.diagnosis.summary);
         }
         let fit = &outcome.diagnosis.fit[0];

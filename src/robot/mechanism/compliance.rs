@@ -17,6 +17,9 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site,
 #[derive(Debug, Clone, Copy)]
 pub struct Compliance;
 
+/// Twists below this [rad] are none.
+const LEAST_TWIST: f64 = 1e-12;
+
 impl<P: Mover> Mechanism<P> for Compliance {
     fn about(&self) -> About {
         About {
@@ -35,7 +38,7 @@ impl<P: Mover> Mechanism<P> for Compliance {
             // Deflections under the usual effort, as fractions of the usual motion.
             let starts = [0.005, 0.03, 0.2].map(|fraction| fraction * typical.output / typical.effort.max(1e-12));
             let twist = Parameter::new("hardening_twist", "rad", f64::INFINITY)
-                .within(1e-6 * typical.output.min(1.0), f64::INFINITY)
+                .within(LEAST_TWIST, f64::INFINITY)
                 .starting_at(&[0.1 * typical.output]);
             let linear = [
                 Parameter::new("compliance", "rad/(N m)", 0.0).within(0.0, f64::INFINITY).starting_at(&starts),

@@ -19,6 +19,8 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site,
 #[derive(Debug, Clone, Copy)]
 pub struct CoulombFriction;
 
+/// Angles below this [rad] are none.
+const LEAST_ANGLE: f64 = 1e-12;
 /// The part of the usual motion over which dry friction gives at the most before it slips.
 pub(super) const PRESLIDING: f64 = 0.05;
 
@@ -44,7 +46,7 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
             .starting_at(&[0.02, 0.2].map(|fraction| fraction * rate));
         let output = typical.output.max(1e-9);
         let angle = Parameter::new("presliding_angle", "rad", 0.05 * output)
-            .within(1e-4 * output.min(1.0), f64::INFINITY)
+            .within(LEAST_ANGLE, f64::INFINITY)
             .starting_at(&[0.01 * output]);
         vec![
             Form { name: "dry", parameters: vec![torque("torque")] },
@@ -59,7 +61,7 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
         let mut forms = Mechanism::<P>::forms(self, typical);
         for parameter in forms.iter_mut().flat_map(|form| &mut form.parameters) {
             if parameter.name == "presliding_angle" {
-                parameter.upper = PRESLIDING * typical.output;
+                (parameter.lower, parameter.upper) = (1e-4 * typical.output.min(1.0), PRESLIDING * typical.output);
             }
         }
         forms

@@ -242,6 +242,7 @@ fn effects<T: Twin>(
 ) -> Vec<Effect> {
     let mut at = inquiry.twin.parameters().len();
     let unseen = findings.fits.iter().map(held_out_remainder).fold(0.0, f64::max);
+    let fitted = selected.added.iter().filter(|number| !inquiry.candidates[**number].finishing).count();
     let mut effects: Vec<Effect> = Vec::new();
     for (number, place) in selected.added.iter().zip(places) {
         let candidate = &inquiry.candidates[*number];
