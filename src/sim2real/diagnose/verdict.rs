@@ -246,8 +246,12 @@ fn effects<T: Twin>(
     let mut effects: Vec<Effect> = Vec::new();
     for (number, place) in selected.added.iter().zip(places) {
         let candidate = &inquiry.candidates[*number];
-        let (confidence, others) =
-            if findings.sampled { calibrated(place, unseen, places.len() - 1) } else { by_evidence(place) };
+        let (confidence, others) = match candidate.finishing {
+            // Steps are seen; that they fit is no more than a check.
+            true => (CERTAIN_BY_SIGHT, Vec::new()),
+            false if findings.sampled => calibrated(place, unseen, fitted.saturating_sub(1)),
+            false => by_evidence(place),
+        };
         let parameters = candidate
             .form
             .parameters
