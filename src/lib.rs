@@ -36,8 +36,10 @@
 //!
 //! let diagnosis = outcome.diagnosis;
 //! assert_eq!(diagnosis.verdict, Verdict::Named);
-//! assert_eq!(diagnosis.effects[0].mechanism, "coulomb_friction");
-//! let torque = &diagnosis.effects[0].parameters["torque"];
+//! // What needs no fit to be seen comes first: the steps of the encoder.
+//! let [quantization, friction] = diagnosis.effects.as_slice() else { panic!("two effects") };
+//! assert_eq!((quantization.mechanism.as_str(), friction.mechanism.as_str()), ("quantization", "coulomb_friction"));
+//! let torque = &friction.parameters["torque"];
 //! assert!((torque.value - 0.3).abs() < 0.02);
 //! assert!(diagnosis.fit[0].trued_rmse < 0.1 * diagnosis.fit[0].recalibrated_rmse);
 //! ```

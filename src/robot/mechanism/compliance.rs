@@ -63,7 +63,7 @@ impl<P: Mover> Mechanism<P> for Compliance {
             hardening_twist: if form < 2 { vec![f64::INFINITY; thetas.lanes()] } else { thetas.row(3).to_vec() },
             second: vec![None; thetas.lanes()],
         };
-        if form % 2 == 0 { Box::new(OnMotor(shaft)) } else { Box::new(OnLink(shaft)) }
+        if form.is_multiple_of(2) { Box::new(OnMotor(shaft)) } else { Box::new(OnLink(shaft)) }
     }
 }
 
