@@ -4,12 +4,8 @@ use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
-use super::weigh::lead;
-use crate::sim2real::identify::Effort;
+use super::weigh::{lead, pursued};
 use crate::sim2real::{Candidate, Twin};
-
-/// A form that stands behind by more than this after a few steps is not followed further.
-const HOPELESS: f64 = 300.0;
 
 /// `whole` with each of its mechanisms in the form that does best beside the others.
 ///
@@ -26,14 +22,7 @@ pub(super) fn reformed<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>,
         let less = inquiry.without(&best, place);
         let screened: Vec<Screened> =
             inquiry.screened_among(&less, other).into_iter().filter(|one| one.number != *number && one.excited).collect();
-        let fits: Vec<Hypothesis<T>> = screened
-            .par_iter()
-            .map(|one| {
-                let briefly = inquiry.extended(&less, one.number, one, Effort::Brief);
-                let near = lead(inquiry, first, &best, &briefly) < HOPELESS;
-                if near { inquiry.refitted(&briefly) } else { briefly }
-            })
-            .collect();
+        let fits: Vec<Hypothesis<T>> = screened.par_iter().map(|one| pursued(inquiry, first, &best, &less, one)).collect();
         for fit in fits {
             if lead(inquiry, first, &best, &fit) < 0.0 {
                 best = fit;

@@ -6,16 +6,13 @@ use super::confidence::by_evidence;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::select::Selection;
-use super::weigh::{SHARE, completes, gain, lead, share};
-use crate::sim2real::identify::Effort;
+use super::weigh::{SHARE, completes, gain, lead, pursued, share};
 use crate::sim2real::{About, Candidate, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
 const SLIGHT: f64 = 0.02;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
-/// A rival that loses by more than this after a few steps is not followed further.
-const HOPELESS: f64 = 300.0;
 /// Other mechanisms fitted in the place of one: those that screening likes best without it, ...
 const BY_SCREEN: usize = 3;
 /// ... and those that stood best when they were tried beside fewer.
@@ -92,11 +89,7 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
             let screened = likely(inquiry, selection, less, name);
             let others: Vec<(usize, f64)> = screened
                 .par_iter()
-                .map(|s| (s.number, inquiry.extended(less, s.number, s, Effort::Brief)))
-                .map(|(other, briefly)| match lead(inquiry, &selection.recalibrated, selected, &briefly) {
-                    loss if loss < HOPELESS => (other, inquiry.refitted(&briefly)),
-                    _ => (other, briefly),
-                })
+                .map(|s| (s.number, pursued(inquiry, &selection.recalibrated, selected, less, s)))
                 .map(|(other, rival)| {
                     let abouts = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
                     (other, loss(inquiry, &selection.recalibrated, selected, &rival, abouts))

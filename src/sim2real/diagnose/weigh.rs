@@ -1,8 +1,10 @@
 //! Weighing: what the evidence says of one hypothesis beside another.
 
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
 use crate::sim2real::Twin;
+use crate::sim2real::identify::Effort;
 
 /// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
 /// quite the form of the real thing, and what they leave looks like something else ...
@@ -14,6 +16,8 @@ const COMPLETES: f64 = 0.8;
 const INFORMATIVE_ROWS: usize = 25;
 /// Residuals with an autocorrelation time below this [rows] are taken for white.
 const NEARLY_WHITE: f64 = 2.0;
+/// What stands behind by more than this after a few steps is not followed further.
+const HOPELESS: f64 = 300.0;
 /// Residuals that differ by less than this part say the same; their numbers of effective residuals differ by more.
 const ALIKE_LEFT: f64 = 0.05;
 
@@ -135,4 +139,16 @@ fn weighed<T: Twin>(
         effective += scale.effective();
     }
     gain - (alternative.free() as f64 - null.free() as f64) * effective.ln()
+}
+
+/// `less` with another candidate: fitted to its end if it comes near `best` in a few steps.
+pub(super) fn pursued<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    best: &Hypothesis<T>,
+    less: &Hypothesis<T>,
+    one: &Screened,
+) -> Hypothesis<T> {
+    let briefly = inquiry.extended(less, one.number, one, Effort::Brief);
+    if lead(inquiry, first, best, &briefly) < HOPELESS { inquiry.refitted(&briefly) } else { briefly }
 }
