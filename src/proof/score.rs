@@ -243,6 +243,15 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn what_is_hardly_reached_may_go_unseen_or_be_named_but_nothing_else_may() {
+        let hardly = |verdict, said: &[(&str, f64)]| entry(Kind::NotExcited, &[("bias", 0.1)], verdict, said);
+        assert!(hardly(Verdict::NoMismatch, &[]).right());
+        assert!(hardly(Verdict::Named, &[("bias", 0.9)]).right());
+        assert!(!hardly(Verdict::Named, &[("drift", 0.9)]).right());
+        assert!(!hardly(Verdict::Unexplained, &[]).right());
+    }
+
+    #[test]
     fn what_no_registry_has_is_to_be_called_unknown() {
         let outside = |size, verdict, said: &[(&str, f64)]| entry(Kind::Outside, &[("shaking", size)], verdict, said);
         assert!(outside(5.0, Verdict::Unexplained, &[("bias", 0.2)]).right());
