@@ -21,6 +21,7 @@ mod run_file;
 mod source;
 mod stamp;
 mod table;
+mod thrift;
 mod time_format;
 mod trajectory;
 mod twin_file;

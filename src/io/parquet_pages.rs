@@ -1,10 +1,138 @@
-//! The page headers of a Parquet file, held to their footer before anything is decoded.
+//! The footer and the page headers of a Parquet file, held to the format and to each other before anything is decoded.
 //!
-//! The decoder believes the counts in a page header, and one damaged byte there makes it ask for more memory than any
-//! machine has, which ends the process. Source of the layout: `parquet.thrift` of the format's specification, and the
-//! compact protocol of Thrift.
+//! The decoder believes the counts it reads and the field numbers before them: one damaged byte makes it ask for more
+//! memory than any machine has, which ends the process. Source of the layout: `parquet.thrift` of the format's specification.
 
 use super::arrow_buffers::MOST_EXPANSION;
+use super::thrift::Shape::{self, Bytes, Flag, List, Number, Structure};
+use super::thrift::Thrift;
+
+const STATISTICS: Shape = Structure(&[
+    (1, Bytes),
+    (2, Bytes),
+    (3, Number),
+    (4, Number),
+    (5, Bytes),
+    (6, Bytes),
+    (7, Flag),
+    (8, Flag),
+]);
+
+const PAGE_HEADER: Shape = Structure(&[
+    (1, Number),
+    (2, Number),
+    (3, Number),
+    (4, Number),
+    (5, Structure(&[(1, Number), (2, Number), (3, Number), (4, Number), (5, STATISTICS)])),
+    (6, Structure(&[])),
+    (7, Structure(&[(1, Number), (2, Number), (3, Flag)])),
+    (
+        8,
+        Structure(&[
+            (1, Number),
+            (2, Number),
+            (3, Number),
+            (4, Number),
+            (5, Number),
+            (6, Number),
+            (7, Flag),
+            (8, STATISTICS),
+        ]),
+    ),
+]);
+
+const TIME: Shape = Structure(&[
+    (1, Flag),
+    (2, Structure(&[(1, Structure(&[])), (2, Structure(&[])), (3, Structure(&[]))])),
+]);
+
+const SCHEMA_ELEMENT: Shape = Structure(&[
+    (1, Number),
+    (2, Number),
+    (3, Number),
+    (4, Bytes),
+    (5, Number),
+    (6, Number),
+    (7, Number),
+    (8, Number),
+    (9, Number),
+    (
+        10,
+        Structure(&[
+            (1, Structure(&[])),
+            (2, Structure(&[])),
+            (3, Structure(&[])),
+            (4, Structure(&[])),
+            (5, Structure(&[(1, Number), (2, Number)])),
+            (6, Structure(&[])),
+            (7, TIME),
+            (8, TIME),
+            (10, Structure(&[(1, Shape::Byte), (2, Flag)])),
+            (11, Structure(&[])),
+            (12, Structure(&[])),
+            (13, Structure(&[])),
+            (14, Structure(&[])),
+            (15, Structure(&[])),
+        ]),
+    ),
+]);
+
+const KEY_VALUE: Shape = Structure(&[(1, Bytes), (2, Bytes)]);
+
+const COLUMN_META_DATA: Shape = Structure(&[
+    (1, Number),
+    (2, List(&Number)),
+    (3, List(&Bytes)),
+    (4, Number),
+    (5, Number),
+    (6, Number),
+    (7, Number),
+    (8, List(&KEY_VALUE)),
+    (9, Number),
+    (10, Number),
+    (11, Number),
+    (12, STATISTICS),
+    (13, List(&Structure(&[(1, Number), (2, Number), (3, Number)]))),
+    (14, Number),
+    (15, Number),
+    (16, Structure(&[(1, Number), (2, List(&Number)), (3, List(&Number))])),
+]);
+
+const COLUMN_CHUNK: Shape = Structure(&[
+    (1, Bytes),
+    (2, Number),
+    (3, COLUMN_META_DATA),
+    (4, Number),
+    (5, Number),
+    (6, Number),
+    (7, Number),
+    (8, Structure(&[(1, Structure(&[])), (2, Structure(&[(1, List(&Bytes)), (2, Bytes)]))])),
+    (9, Bytes),
+]);
+
+const ROW_GROUP: Shape = Structure(&[
+    (1, List(&COLUMN_CHUNK)),
+    (2, Number),
+    (3, Number),
+    (4, List(&Structure(&[(1, Number), (2, Flag), (3, Flag)]))),
+    (5, Number),
+    (6, Number),
+    (7, Number),
+]);
+
+const CIPHER: Shape = Structure(&[(1, Bytes), (2, Bytes), (3, Flag)]);
+
+const FILE_META_DATA: Shape = Structure(&[
+    (1, Number),
+    (2, List(&SCHEMA_ELEMENT)),
+    (3, Number),
+    (4, List(&ROW_GROUP)),
+    (5, List(&KEY_VALUE)),
+    (6, Bytes),
+    (7, List(&Structure(&[(1, Structure(&[]))]))),
+    (8, Structure(&[(1, CIPHER), (2, CIPHER)])),
+    (9, Bytes),
+]);
 
 /// What a page header says.
 #[derive(Debug, Default, Clone, Copy)]
@@ -21,11 +149,11 @@ const MOST_VALUES: i64 = 1 << 26;
 /// Whether the pages of a column chunk fit into its bytes and together have its `values`: the decoder makes room for these
 /// before it sees that there are fewer.
 pub(super) fn pages_agree(chunk: &[u8], values: i64) -> bool {
-    let mut thrift = Thrift { bytes: chunk, at: 0 };
+    let mut thrift = Thrift::new(chunk);
     let mut seen = 0;
-    while seen < values && thrift.at < chunk.len() {
-        let Some(header) = thrift.page_header() else { return false };
-        let left = (chunk.len() - thrift.at) as i64;
+    while seen < values && thrift.left() > 0 {
+        let Some(header) = page_header(&mut thrift) else { return false };
+        let left = thrift.left() as i64;
         // No value of a dictionary is shorter than a byte.
         let most = if header.dictionary { header.uncompressed } else { (values - seen).min(MOST_VALUES) };
         // Compressed or not, a page of levels and values is no longer than that.
@@ -38,138 +166,34 @@ pub(super) fn pages_agree(chunk: &[u8], values: i64) -> bool {
             return false;
         }
         seen += if header.dictionary { 0 } else { header.values };
-        thrift.at += header.compressed as usize;
+        if thrift.skip(header.compressed as u64).is_none() {
+            return false;
+        }
     }
     seen == values
 }
 
-/// Whether the lists of a footer are no longer than it is: the decoder makes room for them first.
+/// Whether a footer is built as the format says, and its lists are no longer than it is: the decoder makes room for them
+/// first.
 pub(super) fn footer_agrees(footer: &[u8]) -> bool {
-    Thrift { bytes: footer, at: 0 }.value(12, 0).is_some()
+    Thrift::new(footer).read(FILE_META_DATA, &mut |_, _, _| {}).is_some()
 }
 
-struct Thrift<'a> {
-    bytes: &'a [u8],
-    at: usize,
-}
-
-impl Thrift<'_> {
-    /// Reads a `PageHeader`.
-    fn page_header(&mut self) -> Option<PageHeader> {
-        let mut header = PageHeader::default();
-        self.structure(0, 0, &mut |outer, field, value| match (outer, field) {
-            (0, 2) => header.uncompressed = value,
-            (0, 3) => header.compressed = value,
-            // The headers of data pages, old and new, and of dictionaries.
-            (5 | 8, 1) => header.values = value,
-            (7, 1) => {
-                header.values = value;
-                header.dictionary = true;
-            }
-            _ => {}
-        })?;
-        Some(header)
-    }
-
-    /// Reads a structure; shows its integers, and those of structures directly in it, with the number of their field
-    /// and of the field around it.
-    fn structure(&mut self, depth: u8, outer: i64, show: &mut dyn FnMut(i64, i64, i64)) -> Option<()> {
-        let mut field = 0_i64;
-        loop {
-            let head = self.byte()?;
-            let (delta, kind) = (head >> 4, head & 0x0f);
-            if kind == 0 {
-                return Some(());
-            }
-            field = if delta == 0 { self.zigzag()? } else { field.checked_add(i64::from(delta))? };
-            match kind {
-                4..=6 => {
-                    let value = self.zigzag()?;
-                    if depth <= 1 {
-                        show(outer, field, value);
-                    }
-                }
-                // Within a structure of a structure nothing is asked for.
-                12 if depth < 8 => self.structure(depth + 1, field, show)?,
-                // A boolean is in its head already.
-                1 | 2 => {}
-                3 => self.skip(1)?,
-                7 => self.skip(8)?,
-                8 => {
-                    let length = self.varint()?;
-                    self.skip(length)?;
-                }
-                // Lists, sets and maps are in no page header.
-                _ => return None,
-            }
+/// Reads a page header.
+fn page_header(thrift: &mut Thrift<'_>) -> Option<PageHeader> {
+    let mut header = PageHeader::default();
+    thrift.read(PAGE_HEADER, &mut |outer, field, value| match (outer, field) {
+        (0, 2) => header.uncompressed = value,
+        (0, 3) => header.compressed = value,
+        // The headers of data pages, old and new, and of dictionaries.
+        (5 | 8, 1) => header.values = value,
+        (7, 1) => {
+            header.values = value;
+            header.dictionary = true;
         }
-    }
-
-    /// Goes over a value of that kind.
-    fn value(&mut self, kind: u8, depth: u8) -> Option<()> {
-        match kind {
-            4..=6 => self.varint().map(drop),
-            9 | 10 if depth < 16 => {
-                let head = self.byte()?;
-                let count = if head >> 4 == 15 { self.varint()? } else { u64::from(head >> 4) };
-                // No item is shorter than a byte, and a boolean is one.
-                let fits = count <= (self.bytes.len() - self.at) as u64;
-                match head & 0x0f {
-                    _ if !fits => None,
-                    1 | 2 => self.skip(count),
-                    kind => (0..count).try_for_each(|_| self.value(kind, depth + 1)),
-                }
-            }
-            12 if depth < 16 => loop {
-                let head = self.byte()?;
-                match head & 0x0f {
-                    0 => return Some(()),
-                    _ if head >> 4 == 0 => self.zigzag().map(drop)?,
-                    _ => {}
-                }
-                // A boolean is in its head already.
-                if !matches!(head & 0x0f, 1 | 2) {
-                    self.value(head & 0x0f, depth + 1)?;
-                }
-            },
-            3 => self.skip(1),
-            7 => self.skip(8),
-            8 => {
-                let length = self.varint()?;
-                self.skip(length)
-            }
-            // There are no maps in a footer.
-            _ => None,
-        }
-    }
-
-    fn byte(&mut self) -> Option<u8> {
-        let byte = self.bytes.get(self.at).copied()?;
-        self.at += 1;
-        Some(byte)
-    }
-
-    fn skip(&mut self, length: u64) -> Option<()> {
-        self.at = self.at.checked_add(usize::try_from(length).ok()?).filter(|at| *at <= self.bytes.len())?;
-        Some(())
-    }
-
-    fn varint(&mut self) -> Option<u64> {
-        let mut value = 0;
-        for shift in (0..64).step_by(7) {
-            let byte = self.byte()?;
-            value |= u64::from(byte & 0x7f) << shift;
-            if byte & 0x80 == 0 {
-                return Some(value);
-            }
-        }
-        None
-    }
-
-    fn zigzag(&mut self) -> Option<i64> {
-        let value = self.varint()?;
-        Some((value >> 1) as i64 ^ -((value & 1) as i64))
-    }
+        _ => {}
+    })?;
+    Some(header)
 }
 
 #[cfg(test)]
@@ -186,6 +210,10 @@ mod tests {
         assert!(!footer_agrees(&[0x29, 0xfc, 0x80, 0x80, 0x80, 0x80, 0x04, 0x15, 2, 0, 0x15, 4, 0, 0]));
         assert!(!footer_agrees(&[0x19; 1_000_000]), "lists within lists");
         assert!(!footer_agrees(&[0x29, 0x3c, 0x15, 2, 0, 0x15, 4, 0, 0]));
+        assert!(!footer_agrees(&[0x25, 0x2c, 0]), "a number where the format has a list");
+        assert!(!footer_agrees(&[0x29, 0x25, 2, 4, 0]), "numbers where the format has structures");
+        assert!(footer_agrees(&[0x05, 0x90, 0x03, 2, 0]), "a field that the format does not know, 200");
+        assert!(!footer_agrees(&[0x05, 0x88, 0x80, 0x08, 2, 0]), "field 65540, which is 4 in 16 bits");
     }
 
     #[test]
