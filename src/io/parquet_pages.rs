@@ -7,16 +7,8 @@ use super::arrow_buffers::MOST_EXPANSION;
 use super::thrift::Shape::{self, Bytes, Flag, List, Number, Structure};
 use super::thrift::Thrift;
 
-const STATISTICS: Shape = Structure(&[
-    (1, Bytes),
-    (2, Bytes),
-    (3, Number),
-    (4, Number),
-    (5, Bytes),
-    (6, Bytes),
-    (7, Flag),
-    (8, Flag),
-]);
+const STATISTICS: Shape =
+    Structure(&[(1, Bytes), (2, Bytes), (3, Number), (4, Number), (5, Bytes), (6, Bytes), (7, Flag), (8, Flag)]);
 
 const PAGE_HEADER: Shape = Structure(&[
     (1, Number),
@@ -41,10 +33,8 @@ const PAGE_HEADER: Shape = Structure(&[
     ),
 ]);
 
-const TIME: Shape = Structure(&[
-    (1, Flag),
-    (2, Structure(&[(1, Structure(&[])), (2, Structure(&[])), (3, Structure(&[]))])),
-]);
+const TIME: Shape =
+    Structure(&[(1, Flag), (2, Structure(&[(1, Structure(&[])), (2, Structure(&[])), (3, Structure(&[]))]))]);
 
 const SCHEMA_ELEMENT: Shape = Structure(&[
     (1, Number),

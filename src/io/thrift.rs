@@ -77,11 +77,7 @@ impl<'a> Thrift<'a> {
             if kind == 0 {
                 return Some(());
             }
-            field = if delta == 0 {
-                i16::try_from(self.zigzag()?).ok()?
-            } else {
-                field.checked_add(i16::from(delta))?
-            };
+            field = if delta == 0 { i16::try_from(self.zigzag()?).ok()? } else { field.checked_add(i16::from(delta))? };
             let inner = fields.iter().find(|(known, _)| *known == field).map_or(Shape::Any, |(_, shape)| *shape);
             if !inner.has(kind) {
                 return None;

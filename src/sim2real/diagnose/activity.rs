@@ -1,7 +1,7 @@
 //! Where, after naming: when each mechanism found acted, and by how much it moved the output.
 //!
 //! The trued twin is followed with the mechanism and, all else equal, without it. So that what it did a while ago does not
-//! count, the run without goes on from the state of the run with every few rows: what parts them was done since.
+//! count, the run without goes on from the state of the run with at every row: what parts them was done since.
 
 use rayon::prelude::*;
 
@@ -11,20 +11,17 @@ use super::{Diagnosis, Moved, Stretch, Verdict};
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Part, Thetas, Trajectory, Twin};
 
-/// Rows after which the run without a mechanism goes on from the state of the run with it: enough for a torque to show in a
-/// position, and few enough to say when.
-const TOGETHER: usize = 4;
 /// A mechanism acts where it moves the output by this part of what it does where it acts most.
-const ACTS: f64 = 0.1;
-/// Some laws do nothing at all at times: where a mechanism rests, to within this part, in so many of the windows, it acts
+const ACTS: f64 = 0.2;
+/// Some laws do nothing at all at times: where a mechanism rests, to within this part, in so many of the rows, it acts
 /// wherever it does anything to speak of.
 const RESTS: f64 = 1e-6;
 const RESTING: f64 = 0.05;
 const ANYTHING: f64 = 0.01;
 /// Acting in this part of the rows is acting throughout.
 const THROUGHOUT: f64 = 0.9;
-/// Pauses of at most this many windows are none.
-const PAUSE: usize = 2;
+/// Pauses of at most this many rows are none.
+const PAUSE: usize = 8;
 /// Balanced accuracy with which a covariate must tell acting from not acting, to be named.
 const SEPARATES: f64 = 0.9;
 /// Time is named where nothing else does better by more than this: what happened once will look like some state.
@@ -48,13 +45,13 @@ pub(super) struct Activity {
     pub onset: Option<f64>,
 }
 
-/// What a mechanism did in one window of rows.
+/// What a mechanism did between one row and the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Deed {
     /// Number of the recording.
     part: usize,
-    /// The first of its rows, and the row after the last.
-    rows: (usize, usize),
+    /// The row.
+    row: usize,
     /// By how much it moved the output, over all channels, in units of the noise.
     size: f64,
 }
@@ -126,9 +123,8 @@ fn activity<T: Twin>(
             *sum = (sum.0 + apart.iter().map(|d| d * d).sum::<f64>(), sum.1 + apart.len());
         }
         // Orders do not wait for one another: each shows by itself what was done to it.
-        let local =
-            if event { None } else { selected.twin.rollout_rejoined(&lanes, recording, rows, TOGETHER, inquiry.seed) };
-        deeds.extend(deeds_of(inquiry, number, part, &local.unwrap_or(free), if event { 1 } else { TOGETHER }));
+        let local = if event { None } else { selected.twin.rollout_rejoined(&lanes, recording, rows, 1, inquiry.seed) };
+        deeds.extend(deeds_of(inquiry, number, part, &local.unwrap_or(free)));
     }
     let moved = moved
         .iter()
@@ -159,21 +155,15 @@ fn deeds_of<T: Twin>(
     number: usize,
     part: &Part<'_, T::Stimulus>,
     runs: &[Trajectory],
-    together: usize,
 ) -> Vec<Deed> {
     let apart: Vec<(Vec<f64>, f64)> =
         inquiry.evidence.weights.iter().map(|w| (difference(runs, &w.channel), w.noise)).collect();
     let size =
         |row: usize| apart.iter().filter_map(|(d, noise)| d.get(row).map(|d| (d / noise).powi(2))).sum::<f64>().sqrt();
-    let rows = part.followed().len();
-    // The difference of a window shows in its last row but one step on, where the lanes meet again.
-    let offset = usize::from(together > 1);
-    (0..(rows - offset.min(rows)) / together)
-        .map(|k| {
-            let own = k * together..(k + 1) * together;
-            let size = own.clone().map(|row| size(row + offset)).fold(0.0, f64::max);
-            Deed { part: number, rows: (part.start + own.start, part.start + own.end), size }
-        })
+    // What is done from a sample on shows in the next one, where the lanes meet again; a message shows it itself.
+    let later = usize::from(inquiry.twin.clock() != Clock::Event);
+    (later..part.followed().len())
+        .map(|row| Deed { part: number, row: part.start + row - later, size: size(row) })
         .filter(|deed| deed.size.is_finite())
         .collect()
 }
@@ -194,9 +184,8 @@ fn told<T: Twin>(inquiry: &Inquiry<'_, T>, deeds: &[Deed], covariates: &Covariat
     if share > THROUGHOUT {
         return throughout();
     }
-    let middle = |deed: &Deed| (deed.rows.0 + deed.rows.1) / 2;
     let values = |k: usize| -> Vec<f64> {
-        deeds.iter().map(|d| covariates[&identity(parts[d.part].recording)][k].1[middle(d)]).collect()
+        deeds.iter().map(|d| covariates[&identity(parts[d.part].recording)][k].1[d.row]).collect()
     };
     let first = parts.first().and_then(|p| covariates.get(&identity(p.recording))).map_or(&[][..], Vec::as_slice);
     let alike = parts.iter().all(|p| covariates.get(&identity(p.recording)).is_some_and(|own| own.len() == first.len()));
@@ -210,7 +199,7 @@ fn told<T: Twin>(inquiry: &Inquiry<'_, T>, deeds: &[Deed], covariates: &Covariat
             rules.extend(Rule::best(&format!("|{name}|"), &unit, &sizes, &acts));
         }
     }
-    let time: Vec<f64> = deeds.iter().map(|d| parts[d.part].recording.time[middle(d)]).collect();
+    let time: Vec<f64> = deeds.iter().map(|d| parts[d.part].recording.time[d.row]).collect();
     let when = if event { None } else { Rule::best("time", "s", &time, &acts) };
     let state = rules.into_iter().max_by(|a, b| a.accuracy.total_cmp(&b.accuracy));
     let better = match (when, state) {
@@ -229,7 +218,7 @@ fn told<T: Twin>(inquiry: &Inquiry<'_, T>, deeds: &[Deed], covariates: &Covariat
     Activity { phrase: Some(phrase), active, moved: Vec::new(), onset }
 }
 
-/// In which windows it acted: the level is that of the windows in which it did most, each counting by how much it did.
+/// In which rows it acted: the level is that of the rows in which it did most, each counting by how much it did.
 fn acts(deeds: &[Deed]) -> Vec<bool> {
     let (fourth, second) = deeds.iter().fold((0.0, 0.0), |(f, s), d| (f + d.size.powi(4), s + d.size.powi(2)));
     let most = if second > 0.0 { (fourth / second).sqrt() } else { 0.0 };
@@ -238,14 +227,14 @@ fn acts(deeds: &[Deed]) -> Vec<bool> {
     deeds.iter().map(|d| most > 0.0 && d.size > level * most).collect()
 }
 
-/// Neighbouring windows in which it acted, as stretches of time; short pauses are none.
+/// Neighbouring rows in which it acted, as stretches of time; short pauses are none.
 fn stretches<T: Twin>(inquiry: &Inquiry<'_, T>, deeds: &[Deed], acts: &[bool]) -> Vec<Stretch> {
     let parts = &inquiry.evidence.free_run;
     let mut runs: Vec<(usize, usize, usize)> = Vec::new();
     for (deed, _) in deeds.iter().zip(acts).filter(|(_, acts)| **acts) {
         match runs.last_mut() {
-            Some((part, _, end)) if *part == deed.part && deed.rows.0 <= *end + PAUSE * TOGETHER => *end = deed.rows.1,
-            _ => runs.push((deed.part, deed.rows.0, deed.rows.1)),
+            Some((part, _, end)) if *part == deed.part && deed.row <= *end + PAUSE => *end = deed.row + 1,
+            _ => runs.push((deed.part, deed.row, deed.row + 1)),
         }
     }
     let stretch = |(part, start, end): (usize, usize, usize)| {
@@ -336,7 +325,7 @@ mod tests {
 
     #[test]
     fn little_is_not_acting() {
-        let deed = |size| Deed { part: 0, rows: (0, 4), size };
+        let deed = |size| Deed { part: 0, row: 0, size };
         let deeds: Vec<Deed> = [1e-3, 0.01, 1.0, 0.8, 0.05, 0.3].into_iter().map(deed).collect();
         assert_eq!(acts(&deeds), [false, false, true, true, false, true]);
         // What rests altogether at times acts wherever it does something.

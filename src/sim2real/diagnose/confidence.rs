@@ -22,10 +22,8 @@ const BY_REMAINDER: f64 = -1.78;
 const BY_OTHERS: f64 = -0.97;
 /// Nothing that is fitted is surer than this.
 const SUREST: f64 = 0.99;
-/// What is in no registry weighs as much as this beside rivals whose weight is at most 1.
-const UNKNOWN: f64 = 0.2;
 
-/// Probabilities of the selected mechanism and of each rival, of which what the registry lacks has its share; `remainder` is
+/// Probabilities of the selected mechanism and of each rival, as their evidence is to its; what the registry lacks has the rest. `remainder` is
 /// the part of the misfit that is left on held-out data, and `others` mechanisms are named beside it.
 pub(super) fn calibrated(place: &Place, remainder: f64, others: usize) -> (f64, Vec<f64>) {
     let evidence = |e: f64, most: f64| (1.0 + e.clamp(0.0, most)).ln();
@@ -36,9 +34,7 @@ pub(super) fn calibrated(place: &Place, remainder: f64, others: usize) -> (f64, 
         + BY_OTHERS * others as f64;
     // Of two that explain the same neither is surer than the other.
     let own = (1.0 / (1.0 + (-odds).exp())).min(by_evidence(place).0).min(SUREST);
-    let weights: Vec<f64> = place.others.iter().map(|(_, loss)| weight(*loss).min(1.0)).collect();
-    let total = UNKNOWN + weights.iter().sum::<f64>();
-    (own, weights.into_iter().map(|w| (1.0 - own) * w / total).collect())
+    (own, place.others.iter().map(|(_, loss)| own * weight(*loss).min(1.0)).collect())
 }
 
 /// The same from what rivals lose alone: the gain is twice the logarithm of a likelihood ratio. That nothing is missing in

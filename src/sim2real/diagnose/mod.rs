@@ -51,7 +51,7 @@ use rivals::Place;
 use select::Selection;
 
 use super::identify::Fit;
-use super::{Candidate, ChannelWeight, Clock, Parameter, Recording, Seed, Twin};
+use super::{Candidate, ChannelWeight, Clock, Parameter, Recording, Seed, Signs, Twin};
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
@@ -128,7 +128,9 @@ pub fn diagnose<T: Twin>(
     progress: Progress<'_>,
 ) -> Outcome<T> {
     let signs = recognize::signs(twin, recordings);
-    let found = Found { signs, of: twin.recognized(&signs) };
+    let lost = recognize::lost(twin, recordings);
+    let of_steps = twin.recognized(&Signs { repeated: 0.0, run: 0.0, ..signs });
+    let found = Found { signs, of: twin.recognized(&signs), of_steps, lost };
     let quiet = twin.quiet();
     if signs.repeated <= 0.0 {
         return followed(&quiet, recordings, held_out, &found, seed, progress);
@@ -140,8 +142,12 @@ pub fn diagnose<T: Twin>(
 
 /// What the recordings show by themselves.
 pub(super) struct Found {
-    signs: super::Signs,
+    signs: Signs,
     of: Vec<Candidate>,
+    /// Those that would be recognized if no sample had been lost.
+    of_steps: Vec<Candidate>,
+    /// When samples were lost.
+    lost: Vec<Stretch>,
 }
 
 /// The same of a twin that is followed, beside what was found without following it.
@@ -190,7 +196,7 @@ fn followed<T: Twin>(
     // What the fit has named already need not be recognized besides.
     let named: Vec<&str> = selection.selected.added.iter().map(|number| candidates[*number].about.name).collect();
     let seen: Vec<&Candidate> = found.of.iter().filter(|c| !named.contains(&c.about.name)).collect();
-    verdict::recognized(&mut diagnosis, &inquiry, &found.signs, &seen);
+    verdict::recognized(&mut diagnosis, &inquiry, found, &seen);
     progress("saying where", 0, 1);
     let covariates = locate::covariates(&inquiry);
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);

@@ -3,6 +3,7 @@
 //! No fit tells of these. A simulated signal can be rounded as the measured one is, and that is better or it is not; a
 //! sample that repeats the one before to the last bit, of a signal that never does so otherwise, is no sample.
 
+use super::Stretch;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::noise::fourth_difference;
 use super::rivals::Place;
@@ -101,6 +102,26 @@ fn longest_by_chance(repeats: &[bool]) -> usize {
     let once = repeats.windows(2).filter(|w| !w[0] && w[1]).count();
     let often = once as f64 / began as f64;
     if often <= 0.0 { 0 } else { ((BY_CHANCE / repeats.len() as f64).ln() / often.min(0.99).ln()).ceil() as usize }
+}
+
+/// When samples of the first channel were lost: from the last that was not to the next.
+pub(super) fn lost<T: Simulator>(twin: &T, recordings: &[Recording<T::Stimulus>]) -> Vec<Stretch> {
+    let Some(channel) = twin.channels().first().filter(|_| twin.clock() != Clock::Event) else { return Vec::new() };
+    let mut stretches = Vec::new();
+    for recording in recordings {
+        let Some(measured) = recording.channel(&channel.name) else { continue };
+        let stale = stale(measured, twin.resolution(recording, &channel.name));
+        let mut row = 0;
+        for run in stale.chunk_by(|a, b| a == b) {
+            let end = row + run.len();
+            if run[0] {
+                let time = |row: usize| recording.time[row.min(recording.len() - 1)];
+                stretches.push(Stretch { recording: recording.name.clone(), start: time(row), end: time(end) });
+            }
+            row = end;
+        }
+    }
+    stretches
 }
 
 /// The recordings with repeated samples marked as lost.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::Found;
 use super::confidence::{by_evidence, calibrated};
 use super::diagnosis::{
     ChannelFit, Checks, Diagnosis, Effect, Estimate, ParameterChange, Rival, SCHEMA, Score, Verdict, Where,
@@ -13,7 +14,7 @@ use super::select::Selection;
 use super::structure::Dependence;
 use super::{whiteness, words};
 use crate::sim2real::identify::Fit;
-use crate::sim2real::{Candidate, Clock, Signs, Twin};
+use crate::sim2real::{Candidate, Clock, Twin};
 
 /// A remainder above this part of the first misfit is more than an error of form.
 const FORM_ERROR: f64 = 0.10;
@@ -40,6 +41,12 @@ const FEWEST_ROWS: usize = 50;
 const CERTAIN_BY_SIGHT: f64 = 0.99;
 /// A mechanism that changes the residuals by less than this, in noise and over all rows, does nothing.
 const DISTINCT: f64 = 5.0;
+/// Larger by less than this, an error is as large.
+const WORSE: f64 = 1.02;
+/// What is less likely than this to be the library's is not said to be.
+const HARDLY_THE_LIBRARY: f64 = 0.1;
+/// The same of what does not carry over to held-out data either.
+const LIKELIER_THAN_NOT: f64 = 0.5;
 /// A name less certain than this is ambiguous.
 const CERTAIN: f64 = 0.7;
 
@@ -100,7 +107,12 @@ pub(super) fn diagnosis<T: Twin>(
 }
 
 /// Adds what the recordings show by themselves.
-pub(super) fn recognized<T: Twin>(diagnosis: &mut Diagnosis, inquiry: &Inquiry<'_, T>, signs: &Signs, found: &[&Candidate]) {
+pub(super) fn recognized<T: Twin>(
+    diagnosis: &mut Diagnosis,
+    inquiry: &Inquiry<'_, T>,
+    Found { signs, of_steps, lost, .. }: &Found,
+    found: &[&Candidate],
+) {
     if found.is_empty() {
         return;
     }
@@ -120,6 +132,7 @@ pub(super) fn recognized<T: Twin>(diagnosis: &mut Diagnosis, inquiry: &Inquiry<'
     }
     diagnosis.checks.notes.push(told);
     diagnosis.effects.extend(found.iter().map(|candidate| {
+        let losses = !of_steps.iter().any(|other| other.about.name == candidate.about.name);
         Effect {
             mechanism: candidate.about.name.to_owned(),
             site: candidate.about.site,
@@ -136,8 +149,8 @@ pub(super) fn recognized<T: Twin>(diagnosis: &mut Diagnosis, inquiry: &Inquiry<'
                 })
                 .collect(),
             rivals: Vec::new(),
-            location: None,
-            active: Vec::new(),
+            location: losses.then(|| format!("at times: {:.1} % of the rows", 100.0 * signs.repeated)),
+            active: if losses { lost.clone() } else { Vec::new() },
             moved: Vec::new(),
         }
     }));
@@ -202,6 +215,23 @@ fn fails_unseen(fit: &ChannelFit, sampled: bool) -> bool {
     far_off(fit) && remainder > FORM_ERROR || sampled && remainder > MOSTLY_LEFT
 }
 
+/// Whether the recalibrated twin leaves more than the noise on held-out data.
+fn above_the_noise(fit: &ChannelFit) -> bool {
+    fit.recalibrated_rmse * fit.recalibrated_rmse > HARDLY_ABOVE * fit.noise_floor * fit.noise_floor
+}
+
+/// Whether what was named does worse on held-out data than nothing.
+fn worse(fit: &ChannelFit) -> bool {
+    fit.trued_rmse > WORSE * fit.recalibrated_rmse
+}
+
+/// The probability that everything named, or one of its rivals each time, is what is missing: the more that is named and
+/// the less sure, the likelier it is that all of it stands for one thing that is in no registry.
+fn library(effects: &[Effect]) -> f64 {
+    let known = |e: &Effect| (e.confidence + e.rivals.iter().map(|r| r.confidence).sum::<f64>()).min(1.0);
+    effects.iter().map(known).product()
+}
+
 /// Whether what is left on held-out data stands far above the noise.
 fn far_off(fit: &ChannelFit) -> bool {
     fit.trued_rmse * fit.trued_rmse > FAR_ABOVE_THE_NOISE * fit.noise_floor * fit.noise_floor
@@ -225,10 +255,21 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
     // What fits the past to the noise and not the future was never excited enough to be told; what fits neither is wrong.
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
-        return if clean { Verdict::NotExcited } else { Verdict::Unexplained };
+        let visible = findings.fits.iter().any(above_the_noise);
+        // What the held-out data do not reach, they do not speak against.
+        let unreached = !visible && !findings.fits.iter().any(worse) && effects.iter().all(|e| e.confidence >= CERTAIN);
+        return match findings.sampled {
+            true if clean && unreached => Verdict::Ambiguous,
+            true if clean && visible && library(effects) < LIKELIER_THAN_NOT => Verdict::Unexplained,
+            _ if clean => Verdict::NotExcited,
+            _ => Verdict::Unexplained,
+        };
     }
     let unseen = findings.fits.iter().any(|fit| fails_unseen(fit, findings.sampled));
-    if unseen || left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
+    if unseen
+        || findings.sampled && library(effects) < HARDLY_THE_LIBRARY
+        || left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL)
+    {
         return Verdict::Unexplained;
     }
     if effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
