@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::sim2real::Site;
 
@@ -128,6 +128,7 @@ pub struct Estimate {
     /// The value, in `unit`.
     pub value: f64,
     /// Its standard deviation, in `unit`.
+    #[serde(deserialize_with = "without_bound")]
     pub std: f64,
     /// Its unit.
     pub unit: String,
@@ -196,12 +197,13 @@ pub struct ParameterChange {
     /// What the recordings say.
     pub value: f64,
     /// Its standard deviation.
+    #[serde(deserialize_with = "without_bound")]
     pub std: f64,
     /// Its unit.
     pub unit: String,
 }
 
-/// Errors of one channel on held-out data, in the channel's unit.
+/// Errors of one channel on held-out data, in the channel's unit; infinite (`null` in a file) where a twin diverges.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChannelFit {
     /// The channel.
@@ -211,19 +213,30 @@ pub struct ChannelFit {
     /// Standard deviation of the measurement noise.
     pub noise_floor: f64,
     /// Root mean square error of the twin as given.
+    #[serde(deserialize_with = "without_bound")]
     pub nominal_rmse: f64,
     /// Of the twin with its own parameters refitted.
+    #[serde(deserialize_with = "without_bound")]
     pub recalibrated_rmse: f64,
     /// Of the twin with what was found added.
+    #[serde(deserialize_with = "without_bound")]
     pub trued_rmse: f64,
     /// Mean absolute error of the twin as given.
+    #[serde(deserialize_with = "without_bound")]
     pub nominal_mae: f64,
     /// Mean absolute error of the twin with its own parameters refitted.
+    #[serde(deserialize_with = "without_bound")]
     pub recalibrated_mae: f64,
     /// Mean absolute error of the twin with what was found added.
+    #[serde(deserialize_with = "without_bound")]
     pub trued_mae: f64,
     /// By what part the trued twin's RMSE lies below the recalibrated twin's: 95 % interval, block bootstrap.
     pub improvement_ci95: [f64; 2],
+}
+
+/// A number, or infinity where a file has none.
+fn without_bound<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::INFINITY))
 }
 
 /// What speaks for and against a verdict.
