@@ -120,6 +120,12 @@ impl<T: Twin> Inquiry<'_, T> {
         )
     }
 
+    /// The same where the recordings are divided in another way than they were for `hypothesis`.
+    pub fn refitted_afresh(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
+        let start = std::slice::from_ref(&hypothesis.fit.values);
+        self.fitted(hypothesis.twin.clone(), hypothesis.added.clone(), start, None, Effort::Thorough)
+    }
+
     /// The best fit of `twin` from several starts.
     fn fitted(
         &self,

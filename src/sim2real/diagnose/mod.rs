@@ -167,8 +167,14 @@ fn followed<T: Twin>(
     let mut inquiry = Inquiry { twin, candidates: &candidates, evidence: &free_run, seed };
     let (mut selection, mut rivals) = selected(&inquiry, progress);
     if evidence.window.is_some() && !selection.complete() {
-        inquiry = Inquiry { evidence: &evidence, ..inquiry };
-        (selection, rivals) = selected(&inquiry, progress);
+        let in_windows = Inquiry { evidence: &evidence, ..inquiry };
+        (selection, rivals) = selected(&in_windows, progress);
+        // What windows have found may be near enough for a free run to tell the rest.
+        let rest = (!selection.selected.added.is_empty()).then(|| selection.resumed(&inquiry, progress));
+        match rest.map(|rest| rivals::settled(&inquiry, rest)).filter(|(rest, _)| rest.complete()) {
+            Some(whole) => (selection, rivals) = whole,
+            None => inquiry = in_windows,
+        }
     }
     selection.mark_accepted(&candidates);
     let selection = recognize::finished(&inquiry, selection, &mut rivals);

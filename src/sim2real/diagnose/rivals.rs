@@ -13,6 +13,8 @@ use crate::sim2real::{About, Candidate, Twin};
 const SLIGHT: f64 = 0.02;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
+/// Rivals that lose by less than this in one form are tried in all.
+const NEAR: f64 = 3.0 * WITHIN;
 /// Other mechanisms fitted in the place of one: those that screening likes best without it, ...
 const BY_SCREEN: usize = 3;
 /// ... and those that stood best when they were tried beside fewer.
@@ -86,44 +88,72 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
         .map(|(own, less)| {
             let name = inquiry.candidates[*own].about.name;
             let whole = gain(inquiry, less, selected);
-            let screened = likely(inquiry, selection, less, name);
-            let others: Vec<(usize, f64)> = screened
-                .par_iter()
-                .map(|s| (s.number, pursued(inquiry, &selection.recalibrated, selected, less, s)))
-                .map(|(other, rival)| {
-                    let abouts = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
-                    (other, loss(inquiry, &selection.recalibrated, selected, &rival, abouts))
-                })
-                .collect();
+            let mut screened = inquiry.screened(less);
+            screened.retain(|one| one.excited && inquiry.candidates[one.number].about.name != name);
+            let losses = |tried: Vec<&Screened>| -> Vec<(usize, f64)> {
+                let one = |s: &&Screened| {
+                    let rival = pursued(inquiry, &selection.recalibrated, selected, less, s);
+                    let abouts = (inquiry.candidates[*own].about, inquiry.candidates[s.number].about);
+                    (s.number, loss(inquiry, &selection.recalibrated, selected, &rival, abouts))
+                };
+                tried.par_iter().map(one).collect()
+            };
+            let mut others = losses(likely(inquiry, selection, &screened));
+            others.extend(losses(further_forms(inquiry, &screened, &others)));
+            best_forms(inquiry, &mut others);
             let nearest = others.iter().map(|(_, loss)| *loss).min_by(f64::total_cmp);
             Place { gain: whole, nearest, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
         })
         .collect()
 }
 
-/// The mechanisms that may be rivals of `own` beside what `less` has, each in its best form.
-fn likely<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, less: &Hypothesis<T>, own: &str) -> Vec<Screened> {
+/// The mechanisms that may be rivals among what was screened, each in the form that looks best.
+fn likely<'s, T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, screened: &'s [Screened]) -> Vec<&'s Screened> {
     let name = |one: &Screened| inquiry.candidates[one.number].about.name;
     let gained = |one: &Screened| {
         let Candidate { about, form, .. } = &inquiry.candidates[one.number];
         let tried = selection.scores.iter().filter(|s| s.mechanism == about.name && s.form == form.name);
         tried.filter_map(|s| s.gain).filter(|gain| *gain > 0.0).fold(0.0, f64::max)
     };
-    let mut screened = inquiry.screened(less);
-    screened.retain(|one| one.excited && name(one) != own);
-    let mut kept: Vec<Screened> = Vec::new();
-    let mut keep = |screened: &mut Vec<Screened>, key: &dyn Fn(&Screened) -> f64, most: usize| {
-        screened.sort_by(|a, b| key(b).total_cmp(&key(a)));
+    let mut order: Vec<&Screened> = screened.iter().collect();
+    let mut kept: Vec<&Screened> = Vec::new();
+    let mut keep = |key: &dyn Fn(&Screened) -> f64, most: usize| {
+        order.sort_by(|a, b| key(b).total_cmp(&key(a)));
         let before = kept.len();
-        for one in screened.iter().filter(|one| key(one) > 0.0) {
+        for one in order.iter().filter(|one| key(one) > 0.0) {
             if kept.len() - before < most && !kept.iter().any(|other| name(other) == name(one)) {
-                kept.push(one.clone());
+                kept.push(one);
             }
         }
     };
-    keep(&mut screened, &gained, BY_GAIN);
-    keep(&mut screened, &|one| one.score, BY_SCREEN);
+    keep(&gained, BY_GAIN);
+    keep(&|one| one.score, BY_SCREEN);
     kept
+}
+
+/// The forms not tried yet of the rivals that come near.
+fn further_forms<'s, T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    screened: &'s [Screened],
+    tried: &[(usize, f64)],
+) -> Vec<&'s Screened> {
+    let name = |number: usize| inquiry.candidates[number].about.name;
+    let near = |one: &Screened| tried.iter().any(|(other, loss)| *loss < NEAR && name(*other) == name(one.number));
+    screened.iter().filter(|one| near(one) && !tried.iter().any(|(other, _)| *other == one.number)).collect()
+}
+
+/// Leaves each mechanism in the form that loses least.
+fn best_forms<T: Twin>(inquiry: &Inquiry<'_, T>, others: &mut Vec<(usize, f64)>) {
+    let name = |number: usize| inquiry.candidates[number].about.name;
+    let mut best: Vec<(usize, f64)> = Vec::new();
+    for (number, loss) in others.drain(..) {
+        match best.iter_mut().find(|(other, _)| name(*other) == name(number)) {
+            Some(known) if loss < known.1 => *known = (number, loss),
+            Some(_) => {}
+            None => best.push((number, loss)),
+        }
+    }
+    *others = best;
 }
 
 /// By how much the rival loses; negative where it is to be preferred.

@@ -24,14 +24,20 @@ const ABOVE_NOISE: f64 = 1.5;
 const NEAR_BEST: usize = 4;
 /// What leaves this many times as much in free run as what it builds on is not an explanation, however well it fits windows.
 const STRAYS: f64 = 1.5;
+/// Hypotheses behind the best by no more than this, and no more than so many, are tried in their other forms.
+const FORMS_MATTER: f64 = 2.0 * ACCEPT;
+const REFORMED: usize = 3;
 /// Hypotheses that each stage hands to the next: the best alone may be the wrong one to build on.
-const BEAM: usize = 3;
-/// Mechanisms fitted from the best hypothesis of the beam; from the others half as many.
+const BEAM: usize = 6;
+/// Mechanisms fitted from each hypothesis of the beam at the most, and from all others than the best together.
 const FITTED: usize = 6;
+const BESIDE: usize = 9;
 /// Of these, those that are fitted to their end: as many as stood best after a few steps.
 const FINISHED: usize = 5;
-/// A hypothesis behind the best by more than this part of what that gains is not built on.
+/// A hypothesis behind the best by more than this part of what that gains is not built on, ...
 const FAR_BEHIND: f64 = 0.5;
+/// ... unless it leaves no more than this many times as much: with residuals as correlated as theirs, gains say little.
+const AS_MUCH: f64 = 1.5;
 /// Mechanisms of which all forms are fitted: those that stood best in the form that screening liked best.
 const IN_ALL_FORMS: usize = 3;
 /// Signatures with a cosine above this look alike: such rivals are fitted too.
@@ -60,15 +66,26 @@ pub(super) fn select<T: Twin>(
     recalibrated: Hypothesis<T>,
     progress: Progress<'_>,
 ) -> Selection<T> {
+    selected_from(inquiry, recalibrated, None, progress)
+}
+
+/// The same, going on from `start` if there is one.
+fn selected_from<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    recalibrated: Hypothesis<T>,
+    start: Option<Hypothesis<T>>,
+    progress: Progress<'_>,
+) -> Selection<T> {
     let mut scores = Vec::new();
-    let mut beam = vec![recalibrated.clone()];
-    let mut best_of_stage: Vec<Hypothesis<T>> = Vec::new();
-    for stage in 0..STAGES {
+    let mut beam = vec![start.clone().unwrap_or_else(|| recalibrated.clone())];
+    let first_stage = start.as_ref().map_or(0, |start| start.added.len());
+    let mut best_of_stage: Vec<Hypothesis<T>> = start.into_iter().collect();
+    for stage in first_stage..STAGES {
         progress("comparing mechanisms", stage, STAGES);
         let (mut children, tried) = expand(inquiry, &recalibrated, &beam, stage);
         scores.extend(tried);
-        if let Some(best) = children.first_mut().filter(|best| stage > 0 && !best.leaves_nothing()) {
-            *best = reformed(inquiry, &recalibrated, best);
+        if stage > 0 {
+            children = in_best_forms(inquiry, &recalibrated, children);
         }
         steadiest_first(inquiry, &recalibrated, &mut children);
         let Some(best) = children.first().cloned() else { break };
@@ -89,11 +106,32 @@ pub(super) fn select<T: Twin>(
         beam = children
             .into_iter()
             .take(if best.leaves_nothing() { 1 } else { BEAM })
-            .filter(|child| lead(inquiry, &recalibrated, &best, child) <= far.max(ACCEPT))
+            .filter(|child| {
+                squares(child) <= AS_MUCH * squares(&best) || lead(inquiry, &recalibrated, &best, child) <= far.max(ACCEPT)
+            })
             .collect();
     }
     let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
     Selection { recalibrated, selected, without, scores }
+}
+
+/// The hypotheses that come near the best, unless that leaves nothing, with each of their mechanisms in its best form; best
+/// first.
+fn in_best_forms<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    mut children: Vec<Hypothesis<T>>,
+) -> Vec<Hypothesis<T>> {
+    let Some(best) = children.first().cloned() else { return children };
+    if best.leaves_nothing() && children.get(1).is_none_or(|other| lead(inquiry, first, &best, other) > FORMS_MATTER) {
+        return children;
+    }
+    for child in children.iter_mut().take(REFORMED) {
+        if lead(inquiry, first, &best, child) <= FORMS_MATTER {
+            *child = reformed(inquiry, first, child);
+        }
+    }
+    ranked(inquiry, first, children)
 }
 
 /// Puts first, of the hypotheses that come near the best, the one that does best in free run, where windows were compared.
@@ -157,6 +195,14 @@ impl<T: Twin> Selection<T> {
         Self { recalibrated, selected, without, scores: self.scores.clone() }
     }
 
+    /// What is found beside this selection as another inquiry follows the recordings.
+    pub fn resumed(&self, inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> Self {
+        let start = inquiry.refitted_afresh(&self.selected);
+        let selection = selected_from(inquiry, inquiry.refitted_afresh(&self.recalibrated), Some(start), progress);
+        let scores = self.scores.iter().cloned().chain(selection.scores).collect();
+        Self { scores, ..selection }
+    }
+
     /// The selection without its `place`-th mechanism.
     pub fn dropped(&self, inquiry: &Inquiry<'_, T>, place: usize) -> Self {
         let (recalibrated, selected, without) = pruned(inquiry, &self.recalibrated, vec![self.without[place].clone()]);
@@ -192,22 +238,13 @@ fn expand<T: Twin>(
     stage: usize,
 ) -> (Vec<Hypothesis<T>>, Vec<Score>) {
     let mut jobs: Vec<(usize, Screened, bool)> = Vec::new();
-    let mut sets: Vec<Vec<usize>> = Vec::new();
     for (place, parent) in beam.iter().enumerate() {
         let mut screened = inquiry.screened(parent);
         screened.sort_by(|a, b| b.score.total_cmp(&a.score));
         let chosen = chosen(inquiry, first, parent, &screened, place);
-        for (one, chosen) in screened.into_iter().zip(chosen) {
-            let mut set: Vec<usize> = parent.set();
-            set.push(one.number);
-            set.sort_unstable();
-            let fitted = chosen && !sets.contains(&set);
-            if fitted {
-                sets.push(set);
-            }
-            jobs.push((place, one, fitted));
-        }
+        jobs.extend(screened.into_iter().zip(chosen).map(|(one, chosen)| (place, one, chosen)));
     }
+    once(beam, &mut jobs);
     let fit = |jobs: &[(usize, Screened, bool)], wanted: &[bool]| -> Vec<Option<Hypothesis<T>>> {
         let one = |((place, one, _), wanted): (&(usize, Screened, bool), &bool)| {
             wanted.then(|| inquiry.extended(&beam[*place], one.number, one, Effort::Brief))
@@ -240,6 +277,26 @@ fn expand<T: Twin>(
         })
         .collect();
     (ranked(inquiry, &beam[0], fitted.into_iter().flatten().collect()), scores)
+}
+
+/// Leaves of the chosen jobs one for each set, and beside those of the best parent as many as would leave least if the others
+/// did all that their signatures promise.
+fn once<T: Twin>(beam: &[Hypothesis<T>], jobs: &mut [(usize, Screened, bool)]) {
+    let left = |(place, one, _): &(usize, Screened, bool)| squares(&beam[*place]) * (1.0 - one.score * one.score);
+    let mut order: Vec<usize> = (0..jobs.len()).filter(|k| jobs[*k].2).collect();
+    order.sort_by(|a, b| (jobs[*a].0 > 0).cmp(&(jobs[*b].0 > 0)).then(left(&jobs[*a]).total_cmp(&left(&jobs[*b]))));
+    let mut sets: Vec<Vec<usize>> = Vec::new();
+    let mut beside = 0;
+    for k in order {
+        let mut set = beam[jobs[k].0].set();
+        set.push(jobs[k].1.number);
+        set.sort_unstable();
+        beside += usize::from(jobs[k].0 > 0);
+        if sets.contains(&set) || beside > BESIDE {
+            jobs[k].2 = false;
+        }
+        sets.push(set);
+    }
 }
 
 /// The forms not fitted yet of those mechanisms that stand best beside the best parent.
@@ -304,8 +361,8 @@ fn chosen<T: Twin>(
         let explained = score * score;
         -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && benefit * explained > needed
     };
-    let all = parent.added.is_empty() && !parent.within(HARDLY_ABOVE);
-    let most = if place == 0 { FITTED } else { FITTED / 2 };
+    let all = place == 0 && !parent.leaves_nothing() && !parent.within(HARDLY_ABOVE);
+    let most = FITTED;
     let mut mechanisms: Vec<&str> = Vec::new();
     screened
         .iter()
@@ -338,6 +395,14 @@ fn pruned<T: Twin>(
     loop {
         if whole.added.is_empty() {
             return (bare.clone(), bare, Vec::new());
+        }
+        // A set must be worth its size beside the best of one less, whether or not that is a part of it.
+        if let Some(smaller) = best_of_stage.pop_if(|smaller| {
+            smaller.added.len() + 1 == whole.added.len()
+                && (gain(inquiry, smaller, &whole) <= ACCEPT || !needed(inquiry, &bare, smaller, &whole))
+        }) {
+            whole = smaller;
+            continue;
         }
         let mut without: Vec<Hypothesis<T>> =
             (0..whole.added.len()).into_par_iter().map(|i| inquiry.without(&whole, i)).collect();

@@ -256,23 +256,24 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
         let visible = findings.fits.iter().any(above_the_noise);
-        // What the held-out data do not reach, they do not speak against.
-        let unreached = !visible && !findings.fits.iter().any(worse) && effects.iter().all(|e| e.confidence >= CERTAIN);
         return match findings.sampled {
-            true if clean && unreached => Verdict::Ambiguous,
-            true if clean && visible && library(effects) < LIKELIER_THAN_NOT => Verdict::Unexplained,
-            _ if clean => Verdict::NotExcited,
-            _ => Verdict::Unexplained,
+            _ if !clean => Verdict::Unexplained,
+            // What held-out data hardly reach, they do not speak against.
+            true if library(effects) >= CERTAIN && !findings.fits.iter().any(worse) => Verdict::Ambiguous,
+            true if library(effects) < LIKELIER_THAN_NOT && visible => Verdict::Unexplained,
+            _ => Verdict::NotExcited,
         };
     }
     let unseen = findings.fits.iter().any(|fit| fails_unseen(fit, findings.sampled));
-    if unseen
-        || findings.sampled && library(effects) < HARDLY_THE_LIBRARY
+    // What the fitted data leave no doubt of is right although its form does not carry over to others.
+    let doubtful = findings.sampled && library(effects) < if unseen { CERTAIN } else { HARDLY_THE_LIBRARY };
+    if doubtful
+        || unseen && !findings.sampled
         || left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL)
     {
         return Verdict::Unexplained;
     }
-    if effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
+    if unseen || effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
 }
 
 fn effects<T: Twin>(

@@ -11,8 +11,8 @@ use crate::sim2real::identify::Effort;
 pub(super) const SHARE: f64 = 0.01;
 const SHARE_OF_MORE: f64 = 0.03;
 /// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
-const COMPLETES: f64 = 0.8;
-/// A mechanism must move at least this many rows by more than the noise.
+const COMPLETES: f64 = 0.75;
+/// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
 const INFORMATIVE_ROWS: usize = 25;
 /// Residuals with an autocorrelation time below this [rows] are taken for white.
 const NEARLY_WHITE: f64 = 2.0;
@@ -112,10 +112,12 @@ pub(super) fn needed<T: Twin>(
             explained >= share_of(whole.added.len()) * all || explained >= COMPLETES * left
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
-    let moved = (0..rows).filter(|i| (less.fit.residual[*i] - whole.fit.residual[*i]).abs() > 1.0).count();
-    // Effects below the noise show in the sum of many rows only: there, the gain alone decides.
-    let weak = moved == 0 && rows > 40 * INFORMATIVE_ROWS;
-    enough && (weak || moved >= INFORMATIVE_ROWS)
+    let change = || (0..rows).map(|i| less.fit.residual[i] - whole.fit.residual[i]);
+    let moved = change().filter(|d| d.abs() > 1.0).count();
+    // Effects below the noise show in the sum of many rows only: over how many it is spread counts then.
+    let (fourth, second) = change().fold((0.0, 0.0), |(f, s), d| (f + d.powi(4), s + d.powi(2)));
+    let spread = rows > 40 * INFORMATIVE_ROWS && second * second >= INFORMATIVE_ROWS as f64 * fourth;
+    enough && (spread || moved >= INFORMATIVE_ROWS)
 }
 
 /// `sum N_e ln(RSS0 / RSS1) - dk ln N_e`, with the effective number of residuals of the *alternative*: autocorrelated
