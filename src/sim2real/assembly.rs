@@ -4,10 +4,11 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::follow::Collected;
+use super::run::Run;
 use super::{
-    About, Candidate, Channel, Clock, Controller, Covariate, Dynamics, Feedback, Law, Measured, Mechanism, Observation,
-    Parameter, Plant, Recording, Scene, Seed, Signs, Simulated, Simulator, Site, Stimulus, Thetas, Tick, Trajectory, Twin,
-    Typical,
+    About, Candidate, Channel, Clock, Controller, Covariate, Dynamics, Measured, Mechanism, Parameter, Plant, Recording,
+    Seed, Signs, Simulator, Site, Stimulus, Thetas, Trajectory, Twin, Typical,
 };
 
 /// The mechanisms a domain knows: one row each.
@@ -164,126 +165,6 @@ impl<P: Plant> Assembly<P> {
     }
 }
 
-/// A running assembly: all lanes, one step at a time.
-pub struct Run<P: Plant> {
-    controller: Option<Box<dyn Feedback<P>>>,
-    dynamics: P::Dynamics,
-    command_laws: Vec<Box<dyn Law<P>>>,
-    plant_laws: Vec<Box<dyn Law<P>>>,
-    observation_laws: Vec<Box<dyn Law<P>>>,
-    states: Vec<P::State>,
-    effects: Vec<P::Effect>,
-    commands: Vec<P::Command>,
-    inputs: Vec<P::Input>,
-    observations: Vec<P::Observation>,
-}
-
-impl<P: Plant> fmt::Debug for Run<P> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Run").field("lanes", &self.states.len()).finish_non_exhaustive()
-    }
-}
-
-impl<P: Plant> Run<P> {
-    /// Sends one command to every lane and gives it as it arrives, one a lane. Where there is a controller, the command is its
-    /// set point, and it acts on what was last observed.
-    pub fn send(&mut self, tick: Tick, command: &P::Command) -> &mut [P::Command] {
-        self.commands.clear();
-        self.commands.resize(self.states.len(), command.clone());
-        if let Some(controller) = &mut self.controller {
-            controller.act(tick.time, &self.observations, &mut self.commands);
-        }
-        self.shape(tick)
-    }
-
-    /// The same before the plant moves, where a controller can see no more than what was measured: its first channel, if at
-    /// all.
-    fn send_before(&mut self, tick: Tick, command: &P::Command, measured: Option<f64>) {
-        self.commands.clear();
-        self.commands.resize(self.states.len(), command.clone());
-        match (&mut self.controller, measured) {
-            (Some(controller), Some(measured)) => controller.act_on_measured(tick.time, measured, &mut self.commands),
-            // What it gave is not known.
-            (Some(_), None) => return,
-            (None, _) => {}
-        }
-        self.shape(tick);
-    }
-
-    /// Whether a controller has to see the plant at `time` [s].
-    fn watched(&self, time: f64) -> bool {
-        self.controller.as_ref().is_some_and(|controller| controller.due(time))
-    }
-
-    /// Shapes the commands on their way.
-    fn shape(&mut self, tick: Tick) -> &mut [P::Command] {
-        for law in &mut self.command_laws {
-            law.shape(tick, &mut self.commands);
-        }
-        &mut self.commands
-    }
-
-    /// Puts commands that were sent earlier, and have been on their way since, before the plant: one a lane. Where several
-    /// messages are under way at once, the last sent need not be the next to arrive.
-    pub fn deliver(&mut self, arriving: &[P::Command]) {
-        self.commands.clear();
-        self.commands.extend_from_slice(arriving);
-    }
-
-    /// Lets the commands last sent or delivered act on the plant, which meets `input` of each lane's command.
-    pub fn advance(&mut self, tick: Tick, input: impl Fn(&P::Command) -> P::Input) {
-        self.advance_seen(tick, input, |_, _| {});
-    }
-
-    /// As [`advance`](Self::advance), and shows `seen` the effects after each plant law, with the law's number among the
-    /// plant laws: what it adds is the difference to what was there before.
-    pub fn advance_seen(
-        &mut self,
-        tick: Tick,
-        input: impl Fn(&P::Command) -> P::Input,
-        mut seen: impl FnMut(usize, &[P::Effect]),
-    ) {
-        self.inputs.clear();
-        self.inputs.extend(self.commands.iter().map(input));
-        self.effects.fill(P::Effect::default());
-        for (k, law) in self.plant_laws.iter_mut().enumerate() {
-            let scene =
-                Scene { dynamics: &self.dynamics, states: &self.states, inputs: &self.inputs, commands: &self.commands };
-            law.act(tick, &scene, &mut self.effects);
-            seen(k, &self.effects);
-        }
-        self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
-    }
-
-    /// What is reported of every lane at `time` [s].
-    pub fn observe(&mut self, time: f64) -> &[P::Observation] {
-        self.dynamics.observe(&self.states, &mut self.observations);
-        for law in &mut self.observation_laws {
-            law.sense(time, &mut self.observations);
-        }
-        &self.observations
-    }
-
-    /// Puts all lanes where the first is; what laws remember stays theirs.
-    pub fn rejoin(&mut self) {
-        if let Some((first, others)) = self.states.split_first_mut() {
-            others.iter_mut().for_each(|state| state.clone_from(first));
-        }
-        if let Some(controller) = &mut self.controller {
-            controller.rejoin();
-            if let Some((first, others)) = self.observations.split_first_mut() {
-                others.iter_mut().for_each(|observation| observation.clone_from(first));
-            }
-        }
-    }
-
-    /// The states, one a lane.
-    #[must_use]
-    pub fn states(&self) -> &[P::State] {
-        &self.states
-    }
-}
-
 impl<P: Plant> Simulator for Assembly<P> {
     type Stimulus = P::Stimulus;
 
@@ -395,127 +276,15 @@ impl<P: Plant> Assembly<P> {
     ) -> Vec<Trajectory> {
         let own = self.parameters.len();
         let mut run = self.run(&thetas.block(0, own), &thetas.block(own, thetas.parameters() - own), seed);
-        let mut out = Follow::new(self.channels(), thetas.lanes(), rows.len(), every);
-        match self.plant.clock() {
-            Clock::Event => self.follow_events(&mut run, recording, rows, &mut out),
-            Clock::Sampled { .. } => self.follow_samples(&mut run, recording, rows, &mut out),
-        }
-        out.trajectories()
-    }
-
-    /// Rows are samples: the observation of a row is taken before its command acts.
-    fn follow_samples(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
-        // What is on its way when a run starts is not lost, whatever row it starts from.
         let shaping = self.parts.iter().filter(|part| part.mechanism.site(part.form) == Site::Command);
         let memory = shaping.map(|part| part.mechanism.memory()).fold(0.0, f64::max);
         let memory = memory + self.controller.as_ref().map_or(0.0, |controller| controller.memory());
-        let seen = self.channels().first().and_then(|channel| recording.channel(&channel.name));
-        let since = recording.time[rows.start] - memory;
-        let warm = recording.time[..rows.start].partition_point(|t| *t < since);
-        for row in warm..rows.end {
-            let time = recording.time[row];
-            if row >= rows.start {
-                out.record(run, time);
-            }
-            if row + 1 == rows.end {
-                break;
-            }
-            let interval = recording.time[row + 1] - time;
-            let substeps = self.clock().substeps(interval);
-            let step = interval / substeps as f64;
-            for sub in 0..substeps {
-                let tick = Tick { index: row, time: time + sub as f64 * step, step };
-                let share = (sub as f64 + 0.5) / substeps as f64;
-                let command = recording.stimulus.command_within(row, share);
-                if row < rows.start {
-                    let along = sub as f64 / substeps as f64;
-                    run.send_before(tick, &command, seen.and_then(|seen| between(seen, row, along)));
-                    continue;
-                }
-                // The row itself has been observed.
-                if sub > 0 && run.watched(tick.time) {
-                    run.observe(tick.time);
-                }
-                run.send(tick, &command);
-                run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
-            }
+        let mut out = Collected::new(self.channels(), thetas.lanes(), rows.len(), every);
+        match self.clock() {
+            Clock::Event => out.follow_events(&mut run, recording, rows),
+            clock => out.follow_samples(&mut run, recording, rows, clock, memory),
         }
-    }
-
-    /// Rows are messages: the observation of a row is the reply to its command.
-    fn follow_events(&self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>, out: &mut Follow) {
-        for row in rows {
-            let tick = Tick { index: row, time: recording.time[row], step: 0.0 };
-            run.send(tick, &recording.stimulus.command(row));
-            run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
-            out.record(run, tick.time);
-        }
-    }
-}
-
-/// The sample `along` of the way from a row to the next, on a straight line; none where one was lost.
-fn between(measured: &Measured, row: usize, along: f64) -> Option<f64> {
-    let (from, to) = (measured.samples[row]?, measured.samples[row + 1]?);
-    Some(from + along * (to - from))
-}
-
-/// Rows that are collected before each channel of each lane is given its own: as many as stay near the processor.
-const COLLECTED: usize = 64;
-
-/// Collects observations, lane by lane and channel by channel.
-struct Follow {
-    trajectories: Vec<Trajectory>,
-    /// Room for rows that are not yet in the trajectories, each with all channels of the first lane, then of the second.
-    collected: Vec<f64>,
-    channels: usize,
-    /// Rows after which all lanes go on from the state of the first, if ever.
-    every: Option<usize>,
-    rows: usize,
-}
-
-impl Follow {
-    fn new(channels: &[Channel], lanes: usize, rows: usize, every: Option<usize>) -> Self {
-        let one: Trajectory =
-            channels.iter().map(|c| Simulated { channel: c.name.to_string(), samples: Vec::with_capacity(rows) }).collect();
-        // A clone of an empty vector has no capacity: reserve in each lane.
-        let mut trajectories = vec![one; lanes];
-        trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
-        let collected = vec![0.0; COLLECTED.min(rows) * lanes * channels.len()];
-        Self { trajectories, collected, channels: channels.len(), every, rows: 0 }
-    }
-
-    /// Numbers in a row of all lanes.
-    fn width(&self) -> usize {
-        self.trajectories.len() * self.channels
-    }
-
-    fn record<P: Plant>(&mut self, run: &mut Run<P>, time: f64) {
-        let width = self.width();
-        let row = &mut self.collected[(self.rows % COLLECTED) * width..][..width];
-        for (values, observation) in row.chunks_exact_mut(self.channels.max(1)).zip(run.observe(time)) {
-            values.iter_mut().enumerate().for_each(|(k, value)| *value = observation.channel(k));
-        }
-        if self.every.is_some_and(|every| self.rows.is_multiple_of(every)) {
-            run.rejoin();
-        }
-        self.rows += 1;
-        if self.rows.is_multiple_of(COLLECTED) {
-            self.sort(COLLECTED);
-        }
-    }
-
-    /// Gives each channel of each lane what was collected of it in the last `rows` rows.
-    fn sort(&mut self, rows: usize) {
-        let width = self.width();
-        for (at, simulated) in self.trajectories.iter_mut().flatten().enumerate() {
-            simulated.samples.extend(self.collected[..rows * width].chunks_exact(width).map(|row| row[at]));
-        }
-    }
-
-    /// All that was collected.
-    fn trajectories(mut self) -> Vec<Trajectory> {
-        self.sort(self.rows % COLLECTED);
-        self.trajectories
+        out.trajectories()
     }
 }
 

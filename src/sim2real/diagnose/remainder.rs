@@ -12,7 +12,7 @@ use crate::sim2real::identify::{Block, Problem};
 use crate::sim2real::{Clock, Covariate, Part, Recording, Twin};
 
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
-pub(super) const AT_THE_NOISE: f64 = 1.5;
+pub(super) const NEAR_THE_NOISE: f64 = 1.5;
 
 /// The part of the recalibrated misfit above the noise that is left: of the channel in which most is left.
 ///
@@ -32,7 +32,7 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
             let sum: f64 = whiteness::of_channel(residual, &blocks, &first.channel).iter().flat_map(|s| s.iter()).sum();
             let constant = if about_mean { sum * sum / count.max(1.0) } else { 0.0 };
             let misfit = first.sum_of_squares - constant - last.level * count;
-            (misfit > (AT_THE_NOISE - 1.0) * last.level * count).then(|| last.above(last.level) / misfit)
+            (misfit > (NEAR_THE_NOISE - 1.0) * last.level * count).then(|| last.above(last.level) / misfit)
         })
         .fold(0.0, f64::max)
 }
@@ -40,7 +40,7 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
 /// What the remaining residuals of messages depend on most.
 pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
     // Below the noise there is nothing to explain, however regular it is: rounding of the arithmetic is regular too.
-    if inquiry.twin.clock() != Clock::Event || selected.within(AT_THE_NOISE) {
+    if inquiry.twin.clock() != Clock::Event || selected.within(NEAR_THE_NOISE) {
         return None;
     }
     let parts = &inquiry.evidence.compared;

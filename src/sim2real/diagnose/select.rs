@@ -14,7 +14,7 @@ use crate::sim2real::{Candidate, Twin};
 /// A mechanism must gain more than this to be added.
 pub(super) const ACCEPT: f64 = 10.0;
 /// A twin that leaves a mean squared residual of at most this many times the noise is not bent by what it lacks.
-const HARDLY_ABOVE: f64 = 1.05;
+const UNBENT: f64 = 1.05;
 /// Most mechanisms in a set.
 const STAGES: usize = 4;
 /// Where a first mechanism alone gains nothing, two may: they are tried while the mean squared residual is this many
@@ -361,7 +361,7 @@ fn chosen<T: Twin>(
         let explained = score * score;
         -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && benefit * explained > needed
     };
-    let all = place == 0 && !parent.leaves_nothing() && !parent.within(HARDLY_ABOVE);
+    let all = place == 0 && !parent.leaves_nothing() && !parent.within(UNBENT);
     let most = FITTED;
     let mut mechanisms: Vec<&str> = Vec::new();
     screened

@@ -8,7 +8,7 @@ use super::diagnosis::{
     ChannelFit, Checks, Diagnosis, Effect, Estimate, ParameterChange, Rival, SCHEMA, Score, Verdict, Where,
 };
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::remainder::AT_THE_NOISE;
+use super::remainder::NEAR_THE_NOISE;
 use super::rivals::Place;
 use super::select::Selection;
 use super::structure::Dependence;
@@ -244,10 +244,10 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
         return match left_over || !selection.selected.within(ABOVE_THE_NOISE) {
-            _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(AT_THE_NOISE)) => Verdict::NotExcited,
+            _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(NEAR_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
             // What is clean where it was fitted and far off elsewhere was not moved enough to be told.
-            false if findings.fits.iter().any(far_off) && selection.selected.within(AT_THE_NOISE) => Verdict::NotExcited,
+            false if findings.fits.iter().any(far_off) && selection.selected.within(NEAR_THE_NOISE) => Verdict::NotExcited,
             false if findings.fits.iter().any(far_off) => Verdict::Unexplained,
             false => Verdict::NoMismatch,
         };

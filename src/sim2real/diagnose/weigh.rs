@@ -15,7 +15,7 @@ const COMPLETES: f64 = 0.75;
 /// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
 const INFORMATIVE_ROWS: usize = 25;
 /// Residuals with an autocorrelation time below this [rows] are taken for white.
-const NEARLY_WHITE: f64 = 2.0;
+const FAIRLY_WHITE: f64 = 2.0;
 /// What stands behind by more than this after a few steps is not followed further.
 const HOPELESS: f64 = 300.0;
 /// Residuals that differ by less than this part say the same; their numbers of effective residuals differ by more.
@@ -71,7 +71,7 @@ fn share_of(mechanisms: usize) -> f64 {
 pub(super) fn completes<T>(other: &Hypothesis<T>, better: &Hypothesis<T>) -> bool {
     other.misfits.iter().zip(&better.misfits).any(|(other, better)| {
         let mean_square = better.sum_of_squares / better.count.max(1) as f64;
-        let white = better.autocorrelation_time < NEARLY_WHITE || better.level > 1.0;
+        let white = better.autocorrelation_time < FAIRLY_WHITE || better.level > 1.0;
         let level = if white { mean_square } else { 1.0 };
         let explained = other.sum_of_squares - better.sum_of_squares;
         explained > 0.0 && explained >= COMPLETES * other.above(level)

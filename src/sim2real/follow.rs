@@ -1,0 +1,127 @@
+//! Following a recording row by row, and what a run says on the way.
+
+use std::ops::Range;
+
+use super::run::Run;
+use super::{Channel, Clock, Measured, Observation, Plant, Recording, Simulated, Stimulus, Tick, Trajectory};
+
+/// Rows that are collected before each channel of each lane is given its own: as many as stay near the processor.
+const COLLECTED: usize = 64;
+
+/// Collects observations, lane by lane and channel by channel.
+pub(super) struct Collected {
+    trajectories: Vec<Trajectory>,
+    /// Room for rows that are not yet in the trajectories, each with all channels of the first lane, then of the second.
+    collected: Vec<f64>,
+    channels: usize,
+    /// Rows after which all lanes go on from the state of the first, if ever.
+    every: Option<usize>,
+    rows: usize,
+}
+
+impl Collected {
+    pub fn new(channels: &[Channel], lanes: usize, rows: usize, every: Option<usize>) -> Self {
+        let one: Trajectory =
+            channels.iter().map(|c| Simulated { channel: c.name.to_string(), samples: Vec::with_capacity(rows) }).collect();
+        // A clone of an empty vector has no capacity: reserve in each lane.
+        let mut trajectories = vec![one; lanes];
+        trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
+        let collected = vec![0.0; COLLECTED.min(rows) * lanes * channels.len()];
+        Self { trajectories, collected, channels: channels.len(), every, rows: 0 }
+    }
+
+    /// Rows are samples: the observation of a row is taken before its command acts.
+    ///
+    /// Commands of the last `memory` [s] before them are sent too: what is on its way when a run starts is not lost, whatever
+    /// row it starts from.
+    pub fn follow_samples<P: Plant>(
+        &mut self,
+        run: &mut Run<P>,
+        recording: &Recording<P::Stimulus>,
+        rows: Range<usize>,
+        clock: Clock,
+        memory: f64,
+    ) {
+        let seen = self.trajectories.first().and_then(|lane| lane.first()).and_then(|s| recording.channel(&s.channel));
+        let since = recording.time[rows.start] - memory;
+        let warm = recording.time[..rows.start].partition_point(|t| *t < since);
+        for row in warm..rows.end {
+            let time = recording.time[row];
+            if row >= rows.start {
+                self.record(run, time);
+            }
+            if row + 1 == rows.end {
+                break;
+            }
+            let interval = recording.time[row + 1] - time;
+            let substeps = clock.substeps(interval);
+            let step = interval / substeps as f64;
+            for sub in 0..substeps {
+                let tick = Tick { index: row, time: time + sub as f64 * step, step };
+                let share = (sub as f64 + 0.5) / substeps as f64;
+                let command = recording.stimulus.command_within(row, share);
+                if row < rows.start {
+                    let along = sub as f64 / substeps as f64;
+                    run.send_before(tick, &command, seen.and_then(|seen| between(seen, row, along)));
+                    continue;
+                }
+                // The row itself has been observed.
+                if sub > 0 && run.watched(tick.time) {
+                    run.observe(tick.time);
+                }
+                run.send(tick, &command);
+                run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
+            }
+        }
+    }
+
+    /// Rows are messages: the observation of a row is the reply to its command.
+    pub fn follow_events<P: Plant>(&mut self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>) {
+        for row in rows {
+            let tick = Tick { index: row, time: recording.time[row], step: 0.0 };
+            run.send(tick, &recording.stimulus.command(row));
+            run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
+            self.record(run, tick.time);
+        }
+    }
+
+    /// Numbers in a row of all lanes.
+    fn width(&self) -> usize {
+        self.trajectories.len() * self.channels
+    }
+
+    fn record<P: Plant>(&mut self, run: &mut Run<P>, time: f64) {
+        let width = self.width();
+        let row = &mut self.collected[(self.rows % COLLECTED) * width..][..width];
+        for (values, observation) in row.chunks_exact_mut(self.channels.max(1)).zip(run.observe(time)) {
+            values.iter_mut().enumerate().for_each(|(k, value)| *value = observation.channel(k));
+        }
+        if self.every.is_some_and(|every| self.rows.is_multiple_of(every)) {
+            run.rejoin();
+        }
+        self.rows += 1;
+        if self.rows.is_multiple_of(COLLECTED) {
+            self.sort(COLLECTED);
+        }
+    }
+
+    /// Gives each channel of each lane what was collected of it in the last `rows` rows.
+    fn sort(&mut self, rows: usize) {
+        let width = self.width();
+        for (at, simulated) in self.trajectories.iter_mut().flatten().enumerate() {
+            simulated.samples.extend(self.collected[..rows * width].chunks_exact(width).map(|row| row[at]));
+        }
+    }
+
+    /// All that was collected.
+    pub fn trajectories(mut self) -> Vec<Trajectory> {
+        self.sort(self.rows % COLLECTED);
+        self.trajectories
+    }
+}
+
+/// The sample `along` of the way from a row to the next, on a straight line; none where one was lost.
+fn between(measured: &Measured, row: usize, along: f64) -> Option<f64> {
+    let (from, to) = (measured.samples[row]?, measured.samples[row + 1]?);
+    Some(from + along * (to - from))
+}

@@ -1,0 +1,125 @@
+//! A plant and its mechanisms under way: all lanes, one step at a time.
+
+use std::fmt;
+
+use super::{Dynamics, Feedback, Law, Plant, Scene, Tick};
+
+/// A running assembly: all lanes, one step at a time.
+pub struct Run<P: Plant> {
+    pub(super) controller: Option<Box<dyn Feedback<P>>>,
+    pub(super) dynamics: P::Dynamics,
+    pub(super) command_laws: Vec<Box<dyn Law<P>>>,
+    pub(super) plant_laws: Vec<Box<dyn Law<P>>>,
+    pub(super) observation_laws: Vec<Box<dyn Law<P>>>,
+    pub(super) states: Vec<P::State>,
+    pub(super) effects: Vec<P::Effect>,
+    pub(super) commands: Vec<P::Command>,
+    pub(super) inputs: Vec<P::Input>,
+    pub(super) observations: Vec<P::Observation>,
+}
+
+impl<P: Plant> fmt::Debug for Run<P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Run").field("lanes", &self.states.len()).finish_non_exhaustive()
+    }
+}
+
+impl<P: Plant> Run<P> {
+    /// Sends one command to every lane and gives it as it arrives, one a lane. Where there is a controller, the command is its
+    /// set point, and it acts on what was last observed.
+    pub fn send(&mut self, tick: Tick, command: &P::Command) -> &mut [P::Command] {
+        self.commands.clear();
+        self.commands.resize(self.states.len(), command.clone());
+        if let Some(controller) = &mut self.controller {
+            controller.act(tick.time, &self.observations, &mut self.commands);
+        }
+        self.shape(tick)
+    }
+
+    /// The same before the plant moves, where a controller can see no more than what was measured: its first channel, if at
+    /// all.
+    pub(super) fn send_before(&mut self, tick: Tick, command: &P::Command, measured: Option<f64>) {
+        self.commands.clear();
+        self.commands.resize(self.states.len(), command.clone());
+        match (&mut self.controller, measured) {
+            (Some(controller), Some(measured)) => controller.act_on_measured(tick.time, measured, &mut self.commands),
+            // What it gave is not known.
+            (Some(_), None) => return,
+            (None, _) => {}
+        }
+        self.shape(tick);
+    }
+
+    /// Whether a controller has to see the plant at `time` [s].
+    pub(super) fn watched(&self, time: f64) -> bool {
+        self.controller.as_ref().is_some_and(|controller| controller.due(time))
+    }
+
+    /// Shapes the commands on their way.
+    fn shape(&mut self, tick: Tick) -> &mut [P::Command] {
+        for law in &mut self.command_laws {
+            law.shape(tick, &mut self.commands);
+        }
+        &mut self.commands
+    }
+
+    /// Puts commands that were sent earlier, and have been on their way since, before the plant: one a lane. Where several
+    /// messages are under way at once, the last sent need not be the next to arrive.
+    pub fn deliver(&mut self, arriving: &[P::Command]) {
+        self.commands.clear();
+        self.commands.extend_from_slice(arriving);
+    }
+
+    /// Lets the commands last sent or delivered act on the plant, which meets `input` of each lane's command.
+    pub fn advance(&mut self, tick: Tick, input: impl Fn(&P::Command) -> P::Input) {
+        self.advance_seen(tick, input, |_, _| {});
+    }
+
+    /// As [`advance`](Self::advance), and shows `seen` the effects after each plant law, with the law's number among the
+    /// plant laws: what it adds is the difference to what was there before.
+    pub fn advance_seen(
+        &mut self,
+        tick: Tick,
+        input: impl Fn(&P::Command) -> P::Input,
+        mut seen: impl FnMut(usize, &[P::Effect]),
+    ) {
+        self.inputs.clear();
+        self.inputs.extend(self.commands.iter().map(input));
+        self.effects.fill(P::Effect::default());
+        for (k, law) in self.plant_laws.iter_mut().enumerate() {
+            let scene =
+                Scene { dynamics: &self.dynamics, states: &self.states, inputs: &self.inputs, commands: &self.commands };
+            law.act(tick, &scene, &mut self.effects);
+            seen(k, &self.effects);
+        }
+        self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
+    }
+
+    /// What is reported of every lane at `time` [s].
+    pub fn observe(&mut self, time: f64) -> &[P::Observation] {
+        self.dynamics.observe(&self.states, &mut self.observations);
+        for law in &mut self.observation_laws {
+            law.sense(time, &mut self.observations);
+        }
+        &self.observations
+    }
+
+    /// Puts all lanes where the first is; what laws remember stays theirs.
+    pub fn rejoin(&mut self) {
+        if let Some((first, others)) = self.states.split_first_mut() {
+            others.iter_mut().for_each(|state| state.clone_from(first));
+        }
+        if let Some(controller) = &mut self.controller {
+            controller.rejoin();
+            if let Some((first, others)) = self.observations.split_first_mut() {
+                others.iter_mut().for_each(|observation| observation.clone_from(first));
+            }
+        }
+    }
+
+    /// The states, one a lane.
+    #[must_use]
+    pub fn states(&self) -> &[P::State] {
+        &self.states
+    }
+}
