@@ -132,6 +132,23 @@ fn a_load_acted_throughout() {
 }
 
 #[test]
+fn lost_samples_are_told_to_the_row() {
+    let mut whole = generated(&[], Excitation::SinesAndSteps, 30);
+    let lost = [(200, 212), (611, 640), (1_500, 1_509), (2_000, 2_031), (2_700, 2_712)];
+    for (from, end) in lost {
+        let last = whole.measured[0].samples[from - 1];
+        whole.measured[0].samples[from..end].fill(last);
+    }
+    let held_out = [generated(&[], Excitation::ChirpAndSteps, 31)];
+    let outcome = diagnose(&twin(), &[whole.clone()], &held_out, Seed(1), &|_, _, _| ());
+    let effect = only(&outcome);
+    assert_eq!(effect.mechanism, "dropout");
+    assert_eq!(effect.location.as_deref(), Some("at times: 3.1 % of the rows"), "93 of 3,000");
+    let told: Vec<(f64, f64)> = effect.active.iter().map(|s| (s.start, s.end)).collect();
+    assert_eq!(told, lost.map(|(from, end)| (whole.time[from], whole.time[end])));
+}
+
+#[test]
 fn drag_acted_where_the_arm_was_fast() {
     let outcome = diagnosed(ServoEffect::TYPICAL[6], 52);
     let effect = only(&outcome);

@@ -8,7 +8,7 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
 use super::whiteness;
-use crate::sim2real::identify::{Block, Problem};
+use crate::sim2real::identify::{Block, Problem, State};
 use crate::sim2real::{Clock, Covariate, Part, Recording, Twin};
 
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
@@ -71,9 +71,9 @@ pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<
     for part in inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out) {
         simulated.entry(identity(part.recording)).or_insert_with(|| part.recording.clone());
     }
-    let mut left = |parts: &[Part<'_, T::Stimulus>]| -> Vec<Left> {
+    let mut left = |parts: &[Part<'_, T::Stimulus>], state: &State| -> Vec<Left> {
         let problem = inquiry.problem(&selected.twin, parts);
-        let residual = problem.evaluate(&selected.fit.values, &inquiry.evidence.initial_state(&problem), &[]).residual;
+        let residual = problem.evaluate(&selected.fit.values, state, &[]).residual;
         let blocks = problem.blocks();
         follow(&problem, &blocks, &residual, &mut simulated);
         let first = blocks.first().map(|b| b.channel.clone());
@@ -86,7 +86,13 @@ pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<
             })
             .collect()
     };
-    let (fitted, unseen) = (left(&inquiry.evidence.compared), left(&held_out));
+    let mut begun = inquiry.evidence.initial_state(&inquiry.problem(&selected.twin, &held_out));
+    if inquiry.evidence.window.is_none() {
+        // A run far from where it should have begun is off by what its motion foretells.
+        let settled = |part| inquiry.evidence.settled(&selected.twin, &selected.fit.values, part);
+        begun.values = held_out.iter().map(settled).collect();
+    }
+    let (fitted, unseen) = (left(&inquiry.evidence.compared, &selected.fit.state), left(&held_out, &begun));
     let covariates: BTreeMap<usize, Vec<Covariate>> =
         simulated.iter().map(|(identity, recording)| (*identity, inquiry.twin.covariates(recording))).collect();
     regression(&fitted, &unseen, &covariates)

@@ -385,3 +385,55 @@ fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: 
     }
     notes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim2real::Site;
+
+    fn effect(confidence: f64, rivals: &[f64]) -> Effect {
+        let rival = |c: &f64| Rival { mechanism: "rival".into(), confidence: *c };
+        Effect {
+            mechanism: "own".into(),
+            site: Site::Plant,
+            confidence,
+            gain: None,
+            margin: None,
+            parameters: BTreeMap::new(),
+            rivals: rivals.iter().map(rival).collect(),
+            location: None,
+            active: Vec::new(),
+            moved: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_rival_is_of_the_library_and_many_unsure_names_are_not() {
+        assert!((library(&[effect(0.5, &[0.4])]) - 0.9).abs() < 1e-12);
+        assert_eq!(library(&[effect(0.6, &[0.6])]), 1.0);
+        assert!(library(&[effect(0.9, &[]), effect(0.3, &[]), effect(0.2, &[])]) < HARDLY_THE_LIBRARY);
+        assert_eq!(library(&[]), 1.0);
+    }
+
+    #[test]
+    fn errors_are_held_to_the_noise_and_to_each_other() {
+        let fit = |recalibrated_rmse: f64, trued_rmse: f64| ChannelFit {
+            channel: "position".into(),
+            unit: "rad".into(),
+            noise_floor: 1.0,
+            nominal_rmse: 20.0,
+            recalibrated_rmse,
+            trued_rmse,
+            nominal_mae: 20.0,
+            recalibrated_mae: recalibrated_rmse,
+            trued_mae: trued_rmse,
+            improvement_ci95: [0.0, 0.0],
+        };
+        assert!(worse(&fit(2.0, 2.1)) && !worse(&fit(2.0, 2.0)));
+        assert!(above_the_noise(&fit(1.2, 1.0)) && !above_the_noise(&fit(1.05, 1.0)));
+        assert!(far_off(&fit(9.0, 3.1)) && !far_off(&fit(9.0, 2.9)));
+        assert!(fails_unseen(&fit(9.0, 3.1), true), "a tenth of the misfit is left, far above the noise");
+        assert!(!fails_unseen(&fit(9.0, 2.9), true), "and close to it that is an error of form");
+        assert!(fails_unseen(&fit(3.0, 2.0), true), "unless it is a third");
+    }
+}

@@ -11,7 +11,7 @@ use crate::sim2real::identify::Effort;
 pub(super) const SHARE: f64 = 0.01;
 const SHARE_OF_MORE: f64 = 0.03;
 /// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
-const COMPLETES: f64 = 0.75;
+const COMPLETES: f64 = 0.8;
 /// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
 const INFORMATIVE_ROWS: usize = 25;
 /// Residuals with an autocorrelation time below this [rows] are taken for white.

@@ -3,8 +3,8 @@
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y -> y + rate t`, on the plant's first channel; in the form `settling`, `y -> y + offset (1 - exp(-t / time_constant))`, as
-/// of electronics that warm up; in the form `under_way`, `y -> y + start + (end - start) (1 - exp(-t / time_constant))`, as of
-/// those that were switched on some time before.
+/// of electronics that warm up; in the form `under_way`, `y -> y + end (1 - (1 - share) exp(-t / time_constant))`, as of those
+/// that were switched on a little before: at the recording's beginning a share of it, no more than half, lies behind them.
 ///
 /// `t` is the recording's own clock: the zero is right at its 0, wherever a run starts. Recordings of one twin with a drift
 /// should count from one beginning, and none from an epoch far away. Before 0 nothing has settled.
@@ -22,7 +22,7 @@ where
             name: "drift",
             site: Site::Observation,
             title: "a drift of the sensor's zero",
-            law: "y -> y + rate t; settling: y -> y + offset (1 - exp(-t / time_constant)); under_way: from start to end so",
+            law: "y -> y + rate t; settling: y -> y + offset (1 - exp(-t / time_constant)); under_way: a share of it at 0",
             source: "instrumental drift, JCGM 200:2012, International Vocabulary of Metrology, 4.21",
             remedy: "let the sensor warm up, or home the axis again from time to time; subtract the drift",
             contains: &["bias"],
@@ -52,7 +52,7 @@ where
                 parameters: vec![
                     Parameter::new("end", "output", 0.0).starting_at(&offsets).proportional(),
                     time.starting_at(&times),
-                    Parameter::new("start", "output", 0.0).starting_at(&[0.0]),
+                    Parameter::new("share", "", 0.0).within(0.0, 0.5).starting_at(&[0.1]),
                 ],
             },
         ]
@@ -63,8 +63,8 @@ where
         let times = || thetas.row(1).to_vec();
         match form {
             0 => Box::new(Rate(size)),
-            1 => Box::new(Settling { start: vec![0.0; size.len()], end: size, time_constant: times() }),
-            _ => Box::new(Settling { start: thetas.row(2).to_vec(), end: size, time_constant: times() }),
+            1 => Box::new(Settling { share: vec![0.0; size.len()], end: size, time_constant: times() }),
+            _ => Box::new(Settling { share: thetas.row(2).to_vec(), end: size, time_constant: times() }),
         }
     }
 }
@@ -85,7 +85,8 @@ where
 }
 
 struct Settling {
-    start: Vec<f64>,
+    /// How much of it lies behind at the recording's beginning.
+    share: Vec<f64>,
     end: Vec<f64>,
     time_constant: Vec<f64>,
 }
@@ -97,9 +98,10 @@ where
     fn sense(&mut self, time: f64, observations: &mut [P::Observation]) {
         let since = time.max(0.0);
         for (lane, observation) in observations.iter_mut().enumerate() {
-            let (start, end, tau) = (self.start[lane], self.end[lane], self.time_constant[lane]);
+            let (share, end, tau) = (self.share[lane], self.end[lane], self.time_constant[lane]);
             if let Some(y) = observation.as_mut().first_mut() {
-                *y += start + (end - start) * if tau > 0.0 { -(-since / tau).exp_m1() } else { 1.0 };
+                let settled = if tau > 0.0 { -(-since / tau).exp_m1() } else { 1.0 };
+                *y += end * (share + (1.0 - share) * settled);
             }
         }
     }
@@ -121,9 +123,9 @@ mod tests {
             assert!((settling[1][i][0] - y - 0.2).abs() < 1e-15);
             assert_eq!(settling[2][i][0], *y);
         }
-        let under_way = &sensed(&Drift, 2, &[&[0.2, 4.0, -0.1]], 1, &rows)[0];
+        let under_way = &sensed(&Drift, 2, &[&[0.2, 4.0, 0.1]], 1, &rows)[0];
         for (i, (t, [y, _])) in rows.iter().enumerate() {
-            assert!((under_way[i][0] - y - 0.2 + 0.3 * (-t / 4.0).exp()).abs() < 1e-14);
+            assert!((under_way[i][0] - y - 0.2 + 0.18 * (-t / 4.0).exp()).abs() < 1e-14);
         }
         // A run that starts in the middle sees the same.
         assert_eq!(sensed(&Drift, 0, &[&[0.03]], 1, &rows[200..])[0], linear[200..]);
