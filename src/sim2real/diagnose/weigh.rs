@@ -18,6 +18,12 @@ const INFORMATIVE_ROWS: usize = 25;
 const FAIRLY_WHITE: f64 = 2.0;
 /// What stands behind by more than this after a few steps is not followed further.
 const HOPELESS: f64 = 300.0;
+/// Mean squares of residuals, in units of the noise, that are no further apart than this say the same ...
+const TOLERATED: f64 = 0.03;
+/// ... where that is no more than this part of what they explain.
+const NEXT_TO_NOTHING: f64 = 0.01;
+/// The evidence between two that say the same in as many constants is no more than this.
+const INDIFFERENT: f64 = 1.0;
 /// Residuals that differ by less than this part say the same; their numbers of effective residuals differ by more.
 const ALIKE_LEFT: f64 = 0.05;
 
@@ -35,7 +41,22 @@ pub(super) fn ranked<T: Twin>(
     let mut keyed: Vec<(f64, Hypothesis<T>)> =
         all.into_iter().map(|h| (weighed(inquiry, reference, &h, scale_of(&h, &best)), h)).collect();
     keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
-    keyed.into_iter().map(|(_, h)| h).collect()
+    let mut order: Vec<Hypothesis<T>> = keyed.into_iter().map(|(_, h)| h).collect();
+    if let Some(best) = order.first() {
+        let simplest = (1..order.len()).filter(|k| alike(reference, best, &order[*k])).min_by_key(|k| order[*k].free());
+        if let Some(k) = simplest.filter(|k| order[*k].free() < best.free()) {
+            order[..=k].rotate_right(1);
+        }
+    }
+    order
+}
+
+/// Whether two alternatives to `first` leave the same but for what steps of integration and forms of laws are off by: less than
+/// the noise by far, and next to nothing of what either explains.
+fn alike<T>(first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> bool {
+    let noise: f64 = a.misfits.iter().zip(&b.misfits).map(|(a, b)| a.level.min(b.level) * a.count as f64).sum();
+    let apart = (squares(a) - squares(b)).abs();
+    apart <= TOLERATED * noise && apart <= NEXT_TO_NOTHING * (squares(first) - squares(a).min(squares(b)))
 }
 
 /// By whose number of effective residuals `one` is weighed beside `best`.
@@ -46,7 +67,16 @@ fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypot
 /// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other.
 pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
     let best = if squares(a) <= squares(b) { a } else { b };
-    weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best))
+    let lead = weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best));
+    if !alike(first, a, b) {
+        return lead;
+    }
+    // What says the same is told apart by its length alone.
+    let effective: f64 = 1.0 + best.misfits.iter().map(ChannelMisfit::effective).sum::<f64>();
+    match b.free() as f64 - a.free() as f64 {
+        0.0 => lead.clamp(-INDIFFERENT, INDIFFERENT),
+        longer => longer * effective.ln(),
+    }
 }
 
 /// The least part of the parent's residual that a further mechanism has to explain to be needed.

@@ -6,7 +6,7 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site,
 /// `time_constant du/dt = u_command - u`; in the form `two_stage`, two such lags of half of `total_time` each, one after the
 /// other: a filter, then a winding; in the form `two_poles` the two have each a time constant of its own.
 ///
-/// Each stage is solved exactly over a tick for a command that holds; what the next gets is the mean over the tick.
+/// Solved exactly over a tick for a command that holds; what the plant gets is the mean over the tick.
 ///
 /// Source: first-order actuator, Åström & Murray, *Feedback Systems* (2nd ed. 2021), section 3.3.
 #[derive(Debug, Clone, Copy)]
@@ -39,39 +39,29 @@ where
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let half = || thetas.row(0).iter().map(|time| 0.5 * time).collect();
-        let stages: Vec<Vec<f64>> = match form {
-            0 => vec![thetas.row(0).to_vec()],
-            1 => vec![half(), half()],
-            _ => vec![thetas.row(0).to_vec(), thetas.row(1).to_vec()],
-        };
         let lag = |time_constant| Lag { time_constant, follower: vec![None; thetas.lanes()], decay: Decay::default() };
-        Box::new(Lags(stages.into_iter().map(lag).collect()))
+        let half = || thetas.row(0).iter().map(|time| 0.5 * time).collect();
+        match form {
+            0 => Box::new(lag(thetas.row(0).to_vec())),
+            1 => Box::new(Stages { first: lag(half()), second: lag(half()) }),
+            _ => Box::new(Stages { first: lag(thetas.row(0).to_vec()), second: lag(thetas.row(1).to_vec()) }),
+        }
     }
 }
-
-/// The stages, in the order in which a command passes them.
-struct Lags(Vec<Lag>);
 
 #[derive(Clone)]
 struct Lag {
     time_constant: Vec<f64>,
-    /// What the actuator gives at the start of the tick; none before the first command, which it has already reached.
+    /// What it gives at the start of the tick; none before the first command, which it has already reached.
     follower: Vec<Option<f64>>,
     decay: Decay,
 }
 
-impl<P: Plant> Law<P> for Lags
+impl<P: Plant> Law<P> for Lag
 where
     P::Command: AsMut<f64>,
 {
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
-        self.0.iter_mut().for_each(|lag| lag.pass(tick, commands));
-    }
-}
-
-impl Lag {
-    fn pass<C: AsMut<f64>>(&mut self, tick: Tick, commands: &mut [C]) {
         let gained = self.decay.over(tick.step, &self.time_constant);
         let lanes = commands.iter_mut().zip(&self.time_constant).zip(&mut self.follower).zip(gained);
         for (((command, tau), follower), gained) in lanes {
@@ -85,6 +75,58 @@ impl Lag {
         }
     }
 }
+
+/// Two stages, of which the second follows the first.
+struct Stages {
+    first: Lag,
+    second: Lag,
+}
+
+impl<P: Plant> Law<P> for Stages
+where
+    P::Command: AsMut<f64>,
+{
+    fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
+        let Self { first, second } = self;
+        let gained =
+            (first.decay.over(tick.step, &first.time_constant), second.decay.over(tick.step, &second.time_constant));
+        for (lane, command) in commands.iter_mut().enumerate() {
+            let u = command.as_mut();
+            let stages = [(first.time_constant[lane], gained.0[lane]), (second.time_constant[lane], gained.1[lane])];
+            let starts = [first.follower[lane].unwrap_or(*u), second.follower[lane].unwrap_or(*u)];
+            first.follower[lane] = Some(starts[0] + (*u - starts[0]) * gained.0[lane]);
+            let (end, mean) = two_stages(*u, starts, stages, tick.step);
+            second.follower[lane] = Some(end);
+            *u = mean;
+        }
+    }
+}
+
+/// What the second of two lags gives at the end of a tick, and in the mean over it, for a command `u` that holds; of each its
+/// time constant [s] and how much of a step it gains over the tick.
+///
+/// The first is off by `x exp(-t / a)` from the command, the second by `y exp(-t / b) + x a / (a - b) (exp(-t / a) - exp(-t / b))`.
+fn two_stages(u: f64, starts: [f64; 2], [(a, gained_a), (b, gained_b)]: [(f64, f64); 2], step: f64) -> (f64, f64) {
+    let [x, y] = starts.map(|start| start - u);
+    // How much of an error is left after the tick, and in the mean over it.
+    let left = |tau: f64, gained: f64| if tau > 0.0 { (1.0 - gained, gained * tau / step) } else { (0.0, 0.0) };
+    if step <= 0.0 {
+        return (starts[1], starts[1]);
+    }
+    let (of_a, of_b) = (left(a, gained_a), left(b, gained_b));
+    let (passed_end, passed_mean) = if (a - b).abs() > ALIKE * a.max(b) {
+        let share = a / (a - b);
+        (share * (of_a.0 - of_b.0), share * (a * gained_a - b * gained_b) / step)
+    } else if a > 0.0 {
+        (step / a * of_a.0, of_a.1 - of_a.0)
+    } else {
+        (0.0, 0.0)
+    };
+    (u + y * of_b.0 + x * passed_end, u + y * of_b.1 + x * passed_mean)
+}
+
+/// Two time constants that differ by less than this part count as one: their difference has too few digits.
+const ALIKE: f64 = 1e-6;
 
 #[cfg(test)]
 mod tests {
