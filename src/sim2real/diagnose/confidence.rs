@@ -33,8 +33,11 @@ pub(super) fn calibrated(place: &Place, remainder: f64, others: usize) -> (f64, 
         + BY_REMAINDER * remainder.clamp(0.0, 1.0)
         + BY_OTHERS * others as f64;
     // Of two that explain the same neither is surer than the other.
-    let own = (1.0 / (1.0 + (-odds).exp())).min(by_evidence(place).0).min(SUREST);
-    (own, place.others.iter().map(|(_, loss)| own * weight(*loss).min(1.0)).collect())
+    let found = 1.0 / (1.0 + (-odds).exp());
+    let (share, others) = by_evidence(place);
+    // Rivals share in what is sure of the name, and not in what speaks for none of them.
+    let scale = (found / share.max(1e-12)).min(1.0);
+    (found.min(share).min(SUREST), others.into_iter().map(|other| scale * other).collect())
 }
 
 /// The same from what rivals lose alone: the gain is twice the logarithm of a likelihood ratio. That nothing is missing in

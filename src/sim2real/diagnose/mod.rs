@@ -170,7 +170,8 @@ fn followed<T: Twin>(
         let in_windows = Inquiry { evidence: &evidence, ..inquiry };
         (selection, rivals) = selected(&in_windows, progress);
         // What windows have found may be near enough for a free run to tell the rest.
-        let rest = (!selection.selected.added.is_empty()).then(|| selection.resumed(&inquiry, progress));
+        let near = selection.complete() && !selection.selected.added.is_empty();
+        let rest = near.then(|| selection.resumed(&inquiry, progress));
         match rest.map(|rest| rivals::settled(&inquiry, rest)).filter(|(rest, _)| rest.complete()) {
             Some(whole) => (selection, rivals) = whole,
             None => inquiry = in_windows,

@@ -15,6 +15,8 @@ use crate::sim2real::{Candidate, Twin};
 pub(super) const ACCEPT: f64 = 10.0;
 /// A twin that leaves a mean squared residual of at most this many times the noise is not bent by what it lacks.
 const UNBENT: f64 = 1.05;
+/// A twin that leaves a mean squared residual of at most this many times the noise lacks little.
+const NEARLY_ALL: f64 = 9.0;
 /// Most mechanisms in a set.
 const STAGES: usize = 4;
 /// Where a first mechanism alone gains nothing, two may: they are tried while the mean squared residual is this many
@@ -134,15 +136,17 @@ fn in_best_forms<T: Twin>(
     ranked(inquiry, first, children)
 }
 
-/// Puts first, of the hypotheses that come near the best, the one that does best in free run, where windows were compared.
+/// Puts first, of the hypotheses that come near the best and are no longer, the one that does best in free run, where windows
+/// were compared.
 fn steadiest_first<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, children: &mut [Hypothesis<T>]) {
     let Some(best) = children.first() else { return };
-    let near = children.iter().take(NEAR_BEST).take_while(|child| lead(inquiry, first, best, child) <= ACCEPT).count();
-    if near < 2 {
+    let close = |child: &Hypothesis<T>| child.free() <= best.free() && lead(inquiry, first, best, child) <= ACCEPT;
+    let near: Vec<usize> = (0..children.len().min(NEAR_BEST)).filter(|k| close(&children[*k])).collect();
+    if near.len() < 2 {
         return;
     }
-    let left: Vec<Option<f64>> = children[..near].par_iter().map(|child| inquiry.left_in_free_run(child)).collect();
-    let least = left.iter().enumerate().filter_map(|(k, left)| Some((k, (*left)?))).min_by(|a, b| a.1.total_cmp(&b.1));
+    let left: Vec<Option<f64>> = near.par_iter().map(|k| inquiry.left_in_free_run(&children[*k])).collect();
+    let least = near.iter().zip(&left).filter_map(|(k, left)| Some((*k, (*left)?))).min_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((k, _)) = least {
         children[..=k].rotate_right(1);
     }
@@ -342,8 +346,8 @@ fn finished<T: Twin>(
 /// Which of the screened candidates, best first, are fitted, each mechanism in the form that screening likes best.
 ///
 /// Beside a twin with nothing added it is all that the recordings could show: the refit of a twin that lacks something may
-/// be bent so far that the signature of what it lacks looks like nothing at all. Beside better twins it is the best, and
-/// whatever looks much like the best.
+/// be bent so far that the signature of what it lacks looks like nothing at all. So may that of the best twin that lacks
+/// little. Elsewhere it is the best, and whatever looks much like the best.
 fn chosen<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     first: &Hypothesis<T>,
@@ -361,7 +365,8 @@ fn chosen<T: Twin>(
         let explained = score * score;
         -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && benefit * explained > needed
     };
-    let all = place == 0 && !parent.leaves_nothing() && !parent.within(UNBENT);
+    let near = parent.added.is_empty() || parent.within(NEARLY_ALL);
+    let all = place == 0 && near && !parent.leaves_nothing() && !parent.within(UNBENT);
     let most = FITTED;
     let mut mechanisms: Vec<&str> = Vec::new();
     screened

@@ -3,8 +3,8 @@
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
-use crate::sim2real::Twin;
 use crate::sim2real::identify::Effort;
+use crate::sim2real::{Clock, Twin};
 
 /// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
 /// quite the form of the real thing, and what they leave looks like something else ...
@@ -43,7 +43,8 @@ pub(super) fn ranked<T: Twin>(
     keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut order: Vec<Hypothesis<T>> = keyed.into_iter().map(|(_, h)| h).collect();
     if let Some(best) = order.first() {
-        let simplest = (1..order.len()).filter(|k| alike(reference, best, &order[*k])).min_by_key(|k| order[*k].free());
+        let simplest =
+            (1..order.len()).filter(|k| alike(inquiry, reference, best, &order[*k])).min_by_key(|k| order[*k].free());
         if let Some(k) = simplest.filter(|k| order[*k].free() < best.free()) {
             order[..=k].rotate_right(1);
         }
@@ -52,8 +53,11 @@ pub(super) fn ranked<T: Twin>(
 }
 
 /// Whether two alternatives to `first` leave the same but for what steps of integration and forms of laws are off by: less than
-/// the noise by far, and next to nothing of what either explains.
-fn alike<T>(first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> bool {
+/// the noise by far, and next to nothing of what either explains. Of messages laws have the form they are written in.
+fn alike<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> bool {
+    if inquiry.twin.clock() == Clock::Event {
+        return false;
+    }
     let noise: f64 = a.misfits.iter().zip(&b.misfits).map(|(a, b)| a.level.min(b.level) * a.count as f64).sum();
     let apart = (squares(a) - squares(b)).abs();
     apart <= TOLERATED * noise && apart <= NEXT_TO_NOTHING * (squares(first) - squares(a).min(squares(b)))
@@ -68,7 +72,7 @@ fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypot
 pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
     let best = if squares(a) <= squares(b) { a } else { b };
     let lead = weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best));
-    if !alike(first, a, b) {
+    if !alike(inquiry, first, a, b) {
         return lead;
     }
     // What says the same is told apart by its length alone.
