@@ -23,7 +23,7 @@ const STAGES: usize = 4;
 /// times the noise.
 const ABOVE_NOISE: f64 = 1.5;
 /// Of so many hypotheses that come near the best on windows, the one that does best in free run is taken.
-const NEAR_BEST: usize = 4;
+const NEAR_BEST: usize = 8;
 /// What leaves this many times as much in free run as what it builds on is not an explanation, however well it fits windows.
 const STRAYS: f64 = 1.5;
 /// Hypotheses behind the best by no more than this, and no more than so many, are tried in their other forms.
@@ -87,7 +87,7 @@ fn selected_from<T: Twin>(
         let (mut children, tried) = expand(inquiry, &recalibrated, &beam, stage);
         scores.extend(tried);
         if stage > 0 {
-            children = in_best_forms(inquiry, &recalibrated, children);
+            children = in_best_forms(inquiry, &beam[0], children);
         }
         steadiest_first(inquiry, &recalibrated, &mut children);
         let Some(best) = children.first().cloned() else { break };
@@ -121,19 +121,19 @@ fn selected_from<T: Twin>(
 /// first.
 fn in_best_forms<T: Twin>(
     inquiry: &Inquiry<'_, T>,
-    first: &Hypothesis<T>,
+    parent: &Hypothesis<T>,
     mut children: Vec<Hypothesis<T>>,
 ) -> Vec<Hypothesis<T>> {
     let Some(best) = children.first().cloned() else { return children };
-    if best.leaves_nothing() && children.get(1).is_none_or(|other| lead(inquiry, first, &best, other) > FORMS_MATTER) {
+    if best.leaves_nothing() && children.get(1).is_none_or(|other| lead(inquiry, parent, &best, other) > FORMS_MATTER) {
         return children;
     }
     for child in children.iter_mut().take(REFORMED) {
-        if lead(inquiry, first, &best, child) <= FORMS_MATTER {
-            *child = reformed(inquiry, first, child);
+        if lead(inquiry, parent, &best, child) <= FORMS_MATTER {
+            *child = reformed(inquiry, parent, child);
         }
     }
-    ranked(inquiry, first, children)
+    ranked(inquiry, parent, children)
 }
 
 /// Puts first, of the hypotheses that come near the best and are no longer, the one that does best in free run, where windows

@@ -24,14 +24,16 @@ const TOLERATED: f64 = 0.03;
 const NEXT_TO_NOTHING: f64 = 0.01;
 /// The evidence between two that say the same in as many constants is no more than this.
 const INDIFFERENT: f64 = 1.0;
+/// Numbers of effective residuals whose ratio is smaller than this differ by their own scatter.
+const AS_WHITE: f64 = 1.25;
 /// Residuals that differ by less than this part say the same; their numbers of effective residuals differ by more.
 const ALIKE_LEFT: f64 = 0.05;
 
 /// Hypotheses by what the evidence says of them, best first.
 ///
 /// Each is weighed with its own number of effective residuals, for the right one leaves whiter ones. But those that leave
-/// nearly as little as the one that leaves least are weighed with the number of that one: their own would rank them by its
-/// scatter.
+/// nearly as little as the one that leaves least, or nearly as white, are weighed with the number of that one: their own would
+/// rank them by its scatter.
 pub(super) fn ranked<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     reference: &Hypothesis<T>,
@@ -65,7 +67,10 @@ fn alike<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesi
 
 /// By whose number of effective residuals `one` is weighed beside `best`.
 fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypothesis<T> {
-    if squares(one) <= (1.0 + ALIKE_LEFT) * squares(best) { best } else { one }
+    let effective = |h: &Hypothesis<T>| h.misfits.iter().map(ChannelMisfit::effective).sum::<f64>();
+    let ratio = effective(one) / effective(best).max(1e-300);
+    let as_white = (1.0 / AS_WHITE..AS_WHITE).contains(&ratio);
+    if as_white || squares(one) <= (1.0 + ALIKE_LEFT) * squares(best) { best } else { one }
 }
 
 /// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other.

@@ -19,9 +19,9 @@ pub(super) struct ChannelMisfit {
 }
 
 impl ChannelMisfit {
-    /// Number of independent residuals that hold as much evidence.
+    /// Number of independent residuals that hold as much evidence: no more than there are.
     pub fn effective(&self) -> f64 {
-        self.count as f64 / self.autocorrelation_time
+        self.count as f64 / self.autocorrelation_time.max(1.0)
     }
 
     /// What is left above noise of mean square `level`.
