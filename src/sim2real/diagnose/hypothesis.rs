@@ -10,6 +10,8 @@ use crate::sim2real::{Candidate, Parameter, Part, Seed, Twin};
 const AT_THE_NOISE: f64 = 1.1;
 /// ... and an autocorrelation time below this [rows] are those of noise.
 const NEARLY_WHITE: f64 = 1.5;
+/// What is no larger than the noise is nothing where its autocorrelation time is below this [rows].
+const HARDLY_COLOURED: f64 = 5.0;
 
 /// The twin with the mechanisms numbered in `added`, and its fit.
 #[derive(Debug, Clone)]
@@ -37,9 +39,14 @@ impl<T> Hypothesis<T> {
         self.fit.free.len()
     }
 
-    /// Whether what is left looks like the noise in size and is as white.
+    /// Whether what is left looks like the noise in size and is as white. Recordings long enough show what any form is off by,
+    /// so what is no larger than the noise itself may be a little less white.
     pub(super) fn leaves_nothing(&self) -> bool {
-        self.misfits.iter().all(|m| m.within(AT_THE_NOISE, 1.0) && m.autocorrelation_time < NEARLY_WHITE)
+        let nothing = |m: &ChannelMisfit| {
+            m.within(AT_THE_NOISE, 1.0) && m.autocorrelation_time < NEARLY_WHITE
+                || m.within(1.0, 1.0) && m.autocorrelation_time < HARDLY_COLOURED
+        };
+        self.misfits.iter().all(nothing)
     }
 
     /// Whether the mean square of what is left is at most `times` that of the noise, whatever its colour.
