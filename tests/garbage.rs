@@ -25,6 +25,16 @@ fn drawn(seed: u64, row: usize) -> f64 {
 }
 
 impl Signal {
+    /// Whether its squares may be larger than numbers go.
+    fn overflows(&self) -> bool {
+        let (Signal::Constant(size)
+        | Signal::Noise(size, _)
+        | Signal::Walk(size, _)
+        | Signal::Steps(size, _)
+        | Signal::Spikes(size, _)) = *self;
+        size > 1e100
+    }
+
     fn rows(&self, count: usize) -> Vec<f64> {
         let rows = 0..count;
         match *self {
@@ -107,7 +117,7 @@ proptest! {
         let twin = Assembly::new(Joint::new(Axis::Rotary, [inertia, friction, 2.0, 1.0], [0.2, 0.2, 0.2, 0.1]), MECHANISMS);
         let fitted = [recording(&commands, &samples, rows, lost, uneven)];
         let outcome = diagnose(&twin, &fitted, &[], Seed(1), &|_, _, _| ());
-        honest(&outcome.diagnosis, format!("{commands:?} {samples:?}").contains("e150"))?;
+        honest(&outcome.diagnosis, commands.overflows() || samples.overflows())?;
         if lost == 1.0 {
             prop_assert_eq!(outcome.diagnosis.verdict, Verdict::NotExcited, "nothing was measured");
         }

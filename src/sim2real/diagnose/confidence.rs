@@ -23,8 +23,8 @@ const BY_OTHERS: f64 = -0.97;
 /// Nothing that is fitted is surer than this.
 const SUREST: f64 = 0.99;
 
-/// Probabilities of the selected mechanism and of each rival, as their evidence is to its; what the registry lacks has the rest. `remainder` is
-/// the part of the misfit that is left on held-out data, and `others` mechanisms are named beside it.
+/// Probabilities of the selected mechanism and of each rival, as their evidence is to its; what the registry lacks has the
+/// rest. `remainder` is the part of the misfit that is left on held-out data, and `others` mechanisms are named beside it.
 pub(super) fn calibrated(place: &Place, remainder: f64, others: usize) -> (f64, Vec<f64>) {
     let evidence = |e: f64, most: f64| (1.0 + e.clamp(0.0, most)).ln();
     let odds = BASE
