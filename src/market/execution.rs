@@ -5,7 +5,7 @@ use crate::sim2real::{
     Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
 };
 
-use super::{Book, InFlight, OrderLog, Side};
+use super::{Book, InFlight, OrderLog, Role, Side};
 
 /// What an arriving order meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +28,8 @@ pub struct ExecutionEffect {
 /// What is reported of an order.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Report {
+    /// As what the order met the market.
+    pub role: Role,
     /// Average price [currency].
     pub price: f64,
     /// Quantity filled [units].
@@ -174,6 +176,7 @@ impl Dynamics<Execution> for Execution {
             let price = met.reference + order.side.sign() * effect.concession;
             let quantity = order.fillable(met.volume);
             *report = Report {
+                role: order.role,
                 price,
                 quantity,
                 fee: 0.0,

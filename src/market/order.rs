@@ -37,11 +37,37 @@ impl Side {
     }
 }
 
-/// A market order between decision and fill: the command of the [execution](super::Execution) plant.
+/// As what an order meets the market: what it costs depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Role {
+    /// It takes what others display, at once.
+    #[default]
+    Taker,
+    /// It rests at its limit until others take it.
+    Maker,
+    /// No order at all: a position that is held, charged for the time since it was charged last.
+    Holder,
+}
+
+impl Role {
+    /// Its word in logs.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Taker => "taker",
+            Self::Maker => "maker",
+            Self::Holder => "holder",
+        }
+    }
+}
+
+/// An order between decision and fill: the command of the [execution](super::Execution) plant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InFlight {
     /// Which way it trades.
     pub side: Side,
+    /// As what it meets the market.
+    pub role: Role,
     /// How much of it is left to fill [units].
     pub quantity: f64,
     /// When it was decided.
@@ -67,6 +93,7 @@ impl InFlight {
     pub fn market(side: Side, quantity: f64, decided_at: Timestamp, assumed: f64, mid: f64) -> Self {
         Self {
             side,
+            role: Role::Taker,
             quantity,
             decided_at,
             arrives_at: decided_at,
@@ -76,6 +103,19 @@ impl InFlight {
             average_daily_volume: None,
             daily_volatility: None,
         }
+    }
+
+    /// The same order in another role.
+    #[must_use]
+    pub fn as_a(mut self, role: Role) -> Self {
+        self.role = role;
+        self
+    }
+
+    /// Whether it takes: what it takes it pays for.
+    #[must_use]
+    pub fn takes(&self) -> bool {
+        self.role == Role::Taker
     }
 
     /// The same order, arriving at another time.

@@ -196,6 +196,7 @@ impl<'d> Session<'d> {
         let mid = price.to_f64();
         let order = InFlight {
             side,
+            role: super::Role::Taker,
             quantity: quantity.to_f64(),
             decided_at: now,
             arrives_at: now,

@@ -54,6 +54,9 @@ impl Law<Execution> for Walk {
         for (((effect, met), order), fraction) in
             effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.fraction)
         {
+            if !order.takes() {
+                continue;
+            }
             let walk = met.book.walk(order.side, order.fillable(met.volume));
             effect.concession += fraction * walk.map_or(0.0, |walk| walk.beyond_touch);
         }

@@ -57,6 +57,9 @@ struct Concession {
 impl Law<Execution> for Concession {
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         for (((effect, met), order), size) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.size) {
+            if !order.takes() {
+                continue;
+            }
             effect.concession += size * if self.of_spread { met.book.half_spread() } else { order.mid * 1e-4 };
         }
     }

@@ -50,6 +50,9 @@ struct Impact {
 impl Law<Execution> for Impact {
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         for (((effect, met), order), bps) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.bps) {
+            if !order.takes() {
+                continue;
+            }
             effect.concession += bps * order.participation(met.volume).sqrt() * order.mid * 1e-4;
         }
     }
