@@ -3,7 +3,10 @@
 use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
-use super::{Cash, Execution, History, Increments, Instrument, Ledger, MoneyError, Reference, Session, Strategy};
+use super::{
+    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, Matching, MoneyError, Reference,
+    Session, Strategy,
+};
 
 /// A backtest, as it was set up.
 #[derive(Debug, Clone)]
@@ -16,7 +19,7 @@ pub struct Backtest {
 }
 
 /// What else a backtest depends on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Cash it begins with.
     pub cash: Cash,
@@ -27,13 +30,18 @@ pub struct Settings {
     pub max_leverage: f64,
     /// The price mechanisms start from where there are quotes; none for what suits the mechanisms.
     pub reference: Option<Reference>,
+    /// How orders are matched.
+    pub matching: Matching,
+    /// How long messages take.
+    pub latencies: Latencies,
 }
 
 impl Settings {
     /// No borrowing: the sum of positions stays within the equity.
     #[must_use]
     pub fn with_cash(cash: Cash) -> Self {
-        Self { cash, seed: Seed::default(), max_leverage: 1.0, reference: None }
+        let (matching, latencies) = Default::default();
+        Self { cash, seed: Seed::default(), max_leverage: 1.0, reference: None, matching, latencies }
     }
 }
 
@@ -54,6 +62,9 @@ pub enum BacktestError {
     /// A leverage that cannot be.
     #[error("max_leverage is {0}\nhint: it is a number above 0; 1 borrows nothing")]
     Leverage(f64),
+    /// A latency that cannot be.
+    #[error(transparent)]
+    Latency(#[from] LatencyError),
     /// An amount that is no amount.
     #[error("{place}: {error}")]
     Money {
@@ -96,6 +107,8 @@ pub struct Held {
     pub invested: usize,
     /// Sum over events of what was held, short positions counted as positive, over equity.
     pub leverage: f64,
+    /// Bars within which orders rested on both sides of the open, so that a rule had to say which was met first.
+    pub ambiguous_bars: usize,
 }
 
 /// All that a backtest leaves.
@@ -125,12 +138,14 @@ impl Backtest {
         if instruments.len() != histories.len() {
             return Err(BacktestError::Unmatched { instruments: instruments.len(), histories: histories.len() });
         }
-        if histories.iter().all(|history| history.bars().is_empty() && history.quotes().is_empty()) {
+        if histories.iter().all(History::is_empty) {
             return Err(BacktestError::NoData);
         }
         if !settings.max_leverage.is_finite() || settings.max_leverage <= 0.0 {
             return Err(BacktestError::Leverage(settings.max_leverage));
         }
+        let Latencies { feed, order, response, compute, .. } = &settings.latencies;
+        [feed, order, response, compute].into_iter().try_for_each(|latency| latency.check())?;
         let increments = instruments
             .iter()
             .map(|i| Increments::of(i).map_err(|error| BacktestError::Money { place: i.symbol.clone(), error }))
@@ -167,7 +182,7 @@ impl Backtest {
     /// # Errors
     /// As [`Backtest::new`].
     pub fn on(&self, histories: Vec<History>) -> Result<Self, BacktestError> {
-        Self::new(self.instruments.clone(), histories, self.venue.clone(), self.settings)
+        Self::new(self.instruments.clone(), histories, self.venue.clone(), self.settings.clone())
     }
 
     /// Starts it, before its first event.

@@ -1,41 +1,12 @@
 //! What became of each order: the record a run leaves, in the form of an execution log.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use serde::Serialize;
 
 use crate::sim2real::Timestamp;
 
-use super::{Cash, Price, Quantity, Side};
-
-/// Why an order was refused before it was sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Reason {
-    /// There is no instrument of that number.
-    UnknownInstrument,
-    /// The quantity is 0 or negative.
-    NoQuantity,
-    /// The quantity is no whole number of lots.
-    OffLot,
-    /// The instrument has had no price yet.
-    NoPrice,
-    /// It would take what is held beyond the run's largest leverage.
-    Leverage,
-}
-
-impl fmt::Display for Reason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::UnknownInstrument => "there is no such instrument",
-            Self::NoQuantity => "the quantity is not above 0",
-            Self::OffLot => "the quantity is no whole number of lots",
-            Self::NoPrice => "the instrument has had no price yet",
-            Self::Leverage => "it would exceed the run's largest leverage",
-        })
-    }
-}
+use super::{Cash, EventKind, OrderId, OrderKind, Price, Quantity, Reason, Role, Side, TimeInForce};
 
 /// An order that was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,15 +27,29 @@ pub struct Rejection {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// On its way when the data ended: it met no market.
+    /// Under way when the data ended, filled in part or not at all.
     Unfilled,
     /// Filled whole.
     Filled,
     /// Filled in part or not at all; the rest was cancelled.
     Cancelled,
+    /// Refused by the venue.
+    Rejected,
+    /// Filled in part or not at all when its time was over.
+    Expired,
 }
 
 impl Status {
+    /// How far an order came that ended for `reason`.
+    #[must_use]
+    pub fn ended(reason: Reason) -> Self {
+        match reason {
+            Reason::PostOnly | Reason::FillOrKill => Self::Rejected,
+            Reason::TimeInForce => Self::Expired,
+            _ => Self::Cancelled,
+        }
+    }
+
     /// Its word in tables.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -72,6 +57,8 @@ impl Status {
             Self::Unfilled => "unfilled",
             Self::Filled => "filled",
             Self::Cancelled => "cancelled",
+            Self::Rejected => "rejected",
+            Self::Expired => "expired",
         }
     }
 }
@@ -79,12 +66,18 @@ impl Status {
 /// An order that was sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Order {
-    /// Its id, from 1 in the order of decisions.
+    /// Its id, from 1 in the order of decisions; those of orders that were refused are missing.
     pub order_id: u64,
     /// Number of the instrument.
     pub instrument: usize,
     /// When it was decided; it is sent at once.
     pub decided_at: Timestamp,
+    /// When it arrives at the venue.
+    pub arrives_at: Timestamp,
+    /// When it trades, and at which prices: as it was last changed.
+    pub kind: OrderKind,
+    /// For how long it works.
+    pub time_in_force: TimeInForce,
     /// Which way.
     pub side: Side,
     /// How much.
@@ -97,11 +90,13 @@ pub struct Order {
     pub seen_ask: Option<f64>,
     /// How far it came.
     pub status: Status,
+    /// Why it works no longer, where some of it is left.
+    pub reason: Option<Reason>,
     /// How much was filled.
     pub filled: Quantity,
 }
 
-/// A fill. All of them take liquidity: there are market orders only.
+/// A fill.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fill {
     /// Its id, from 1 in the order of fills.
@@ -124,6 +119,25 @@ pub struct Fill {
     pub realised: Option<Cash>,
     /// What it cost against the price at decision.
     pub cost: FillCost,
+    /// Why it was filled then and at that price.
+    pub why: Why,
+}
+
+/// Why an order was filled when it was, and at the price it was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Why {
+    /// As what it met the market.
+    pub role: Role,
+    /// What kind of data brought it about.
+    pub data: EventKind,
+    /// Which row of these data of its instrument, from 0.
+    pub row: usize,
+    /// Open or mid it met [currency].
+    pub met: f64,
+    /// Lowest and highest price the data show for that time: where it might have been filled at best and at worst.
+    pub band: [Price; 2],
+    /// What stood ahead of it when it joined the queue [units]; 0 where it took.
+    pub queued_behind: f64,
 }
 
 /// What a fill cost against the price at decision, a positive number being a loss [currency]; the parts and the fee add
@@ -143,10 +157,14 @@ pub struct FillCost {
 /// All that was recorded of orders.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Blotter {
-    /// Orders sent, in the order of decisions; order id `k` is at `k - 1`.
+    /// Orders sent, in the order of decisions: their ids increase.
     pub orders: Vec<Order>,
-    /// Fills, in the order of time.
+    /// Fills, in the order in which they became known.
     pub fills: Vec<Fill>,
+    /// Ids of the mechanisms that act on prices, in their order.
+    pub conceding: Vec<&'static str>,
+    /// What each of these added to the price of each fill [currency]: fill by fill.
+    pub terms: Vec<f64>,
     /// What each mechanism added to the prices of all fills, by its id: a loss is positive [currency].
     pub concessions: BTreeMap<&'static str, f64>,
     /// The first orders that were refused, at most [`Blotter::REJECTIONS_KEPT`].
@@ -164,6 +182,28 @@ impl Blotter {
         if self.rejections.len() < Self::REJECTIONS_KEPT {
             self.rejections.push(rejection);
         }
+    }
+
+    /// The order of that id.
+    #[must_use]
+    pub fn order(&self, id: u64) -> Option<&Order> {
+        self.orders.get(self.place(OrderId(id))?)
+    }
+
+    /// Where the order of that id is.
+    pub(super) fn place(&self, id: OrderId) -> Option<usize> {
+        // Most often no order before it was refused.
+        let guess = (id.0 as usize).wrapping_sub(1);
+        if self.orders.get(guess).is_some_and(|order| order.order_id == id.0) {
+            return Some(guess);
+        }
+        self.orders.binary_search_by_key(&id.0, |order| order.order_id).ok()
+    }
+
+    /// What each mechanism added to the price of fill `k`, against the order positive [currency], by its id.
+    pub fn terms_of(&self, k: usize) -> impl Iterator<Item = (&'static str, f64)> {
+        let count = self.conceding.len();
+        self.conceding.iter().copied().zip(self.terms.iter().skip(k * count).copied())
     }
 
     /// Number of orders sent that came as far as `status`.

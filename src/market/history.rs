@@ -2,7 +2,7 @@
 
 use crate::sim2real::Timestamp;
 
-use super::{Bar, Price, Quotes};
+use super::{Bar, DepthChange, OrderEvent, Price, Print, Quotes};
 
 /// Bars and quotes of one instrument, in the order in which they could be known. It was made by its own checks, so that
 /// what reads it need not check again.
@@ -10,6 +10,9 @@ use super::{Bar, Price, Quotes};
 pub struct History {
     bars: Vec<Bar>,
     quotes: Quotes,
+    prints: Vec<Print>,
+    depth: Vec<DepthChange>,
+    orders: Vec<OrderEvent>,
 }
 
 /// A history that cannot be.
@@ -73,13 +76,23 @@ impl History {
     pub fn new(bars: Vec<Bar>, quotes: Quotes) -> Result<Self, HistoryError> {
         check_bars(&bars)?;
         check_quotes(&quotes)?;
-        Ok(Self { bars, quotes })
+        Ok(Self { bars, quotes, ..Self::default() })
     }
 
     /// Its bars, oldest first.
     #[must_use]
     pub fn bars(&self) -> &[Bar] {
         &self.bars
+    }
+
+    /// Whether nothing is known.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.bars.is_empty()
+            && self.quotes.is_empty()
+            && self.prints.is_empty()
+            && self.depth.is_empty()
+            && self.orders.is_empty()
     }
 
     /// Its bars alone, oldest first.
@@ -94,10 +107,46 @@ impl History {
         &self.quotes
     }
 
+    /// Its trades, oldest first.
+    #[must_use]
+    pub fn prints(&self) -> &[Print] {
+        &self.prints
+    }
+
+    /// The changes of its book by price, oldest first.
+    #[must_use]
+    pub fn depth(&self) -> &[DepthChange] {
+        &self.depth
+    }
+
+    /// What happened to the orders in its book, oldest first.
+    #[must_use]
+    pub fn order_events(&self) -> &[OrderEvent] {
+        &self.orders
+    }
+
+    /// The same with trades.
+    #[must_use]
+    pub fn with_prints(self, prints: Vec<Print>) -> Self {
+        Self { prints, ..self }
+    }
+
+    /// The same with changes of the book by price.
+    #[must_use]
+    pub fn with_depth(self, depth: Vec<DepthChange>) -> Self {
+        Self { depth, ..self }
+    }
+
+    /// The same with what happened to the orders in the book.
+    #[must_use]
+    pub fn with_order_events(self, orders: Vec<OrderEvent>) -> Self {
+        Self { orders, ..self }
+    }
+
     /// These bars with the quotes of `other`: each was checked when it was made.
     #[must_use]
     pub fn with_quotes_of(self, other: Self) -> Self {
-        Self { bars: self.bars, quotes: other.quotes }
+        Self { quotes: other.quotes, ..self }
     }
 
     /// The same history without what was known before `start` or after `end`.
@@ -110,7 +159,7 @@ impl History {
         for quote in (from..all.len()).map_while(|k| all.get(k)).take_while(|quote| quote.time <= end) {
             quotes.push(quote.time, quote.bids, quote.asks);
         }
-        Self { bars, quotes }
+        Self { bars, quotes, ..Self::default() }
     }
 }
 

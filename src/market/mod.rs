@@ -1,5 +1,6 @@
 //! Markets: what is traded, the backtest that trades it, and `execution`, the plant every order meets.
 
+mod agenda;
 mod backtest;
 mod bar;
 mod blotter;
@@ -8,12 +9,16 @@ mod check;
 mod covariate;
 mod daily;
 mod depth;
+mod depth_book;
+mod desk;
 mod execution;
 mod feed;
 mod history;
 #[cfg(feature = "io")]
 mod history_file;
 mod instrument;
+mod known;
+mod latency;
 mod ledger;
 mod log_entry;
 #[cfg(feature = "io")]
@@ -24,8 +29,10 @@ mod money;
 mod order;
 mod order_log;
 mod own_print;
+mod past;
 mod price_assumption;
 mod quote;
+mod reason;
 #[cfg(feature = "io")]
 mod run;
 #[cfg(feature = "io")]
@@ -39,21 +46,26 @@ mod strategy;
 mod tape;
 #[cfg(feature = "io")]
 mod tape_file;
+mod ticket;
+mod transit;
 #[cfg(feature = "io")]
 mod twin;
 mod venue;
 
 pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 pub use bar::Bar;
-pub use blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
+pub use blotter::{Blotter, Fill, FillCost, Order, Rejection, Status, Why};
 pub use book::{Book, Level, Walk};
 pub use check::{check_strategy, check_strategy_on};
 pub use daily::Daily;
 pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
+pub use depth_book::DepthBook;
 pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
-pub use feed::Feed;
+pub use feed::{Arrival, Feed};
 pub use history::{History, HistoryError};
 pub use instrument::Instrument;
+pub use known::OpenOrder;
+pub use latency::{Latencies, Latency, LatencyError, Strain};
 pub use ledger::{Ledger, Position, Trade};
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
 #[cfg(feature = "io")]
@@ -65,15 +77,17 @@ pub use order_log::{LogMarket, OrderLog};
 pub use own_print::{Piece, own_print, shown_delay};
 pub use price_assumption::PriceAssumption;
 pub use quote::{Quote, QuoteSlice, Quotes};
+pub use reason::Reason;
 #[cfg(feature = "io")]
 pub use run::{PreparedRun, explained, prepare_run};
 #[cfg(feature = "io")]
 pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
 pub use session::Session;
-pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
+pub use strategy::{Event, EventKind, News, Notice, Orders, Strategy, View};
 pub use tape::{Print, Seen, Tape};
 #[cfg(feature = "io")]
 pub use tape_file::{TapeFiles, read_tape};
+pub use ticket::{Bracket, Condition, Link, OrderId, OrderKind, Request, Ticket, TimeInForce};
 #[cfg(feature = "io")]
 pub use twin::{execution_assembly, execution_logs, execution_twin};
-pub use venue::{Answer, Reference, Venue};
+pub use venue::{Intrabar, LimitFill, Matching, QueueModel, Reference};

@@ -79,6 +79,18 @@ impl Price {
         nanos("a price", value).map(Self)
     }
 
+    /// The price higher by `other`, as far as 64 bits reach.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+
+    /// The price lower by `other`, as far as 64 bits reach.
+    #[must_use]
+    pub fn minus(self, other: Self) -> Self {
+        Self(self.0.saturating_sub(other.0))
+    }
+
     /// The price as a floating-point number [currency], the nearest there is.
     #[must_use]
     pub fn to_f64(self) -> f64 {
@@ -260,6 +272,18 @@ impl Increments {
     #[must_use]
     pub fn holds(self, quantity: Quantity) -> bool {
         quantity.0 % self.lot == 0
+    }
+
+    /// Whether `price` is on a tick.
+    #[must_use]
+    pub fn on_tick(self, price: Price) -> bool {
+        price.0 % self.tick == 0
+    }
+
+    /// One tick.
+    #[must_use]
+    pub fn tick(self) -> Price {
+        Price(self.tick)
     }
 
     /// One lot.

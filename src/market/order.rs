@@ -27,6 +27,15 @@ impl Side {
         [Self::Buy, Self::Sell].into_iter().find(|side| word.eq_ignore_ascii_case(side.word()))
     }
 
+    /// The side it trades with.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Buy => Self::Sell,
+            Self::Sell => Self::Buy,
+        }
+    }
+
     /// +1 for a buy, -1 for a sell.
     #[must_use]
     pub fn sign(self) -> f64 {

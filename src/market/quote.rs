@@ -89,6 +89,23 @@ impl Quotes {
         self.depth
     }
 
+    /// Forgets all but the newest `count`.
+    pub(super) fn keep_newest(&mut self, count: usize) {
+        let gone = self.len().saturating_sub(count);
+        self.times.drain(..gone);
+        self.levels.drain(..2 * self.depth * gone);
+        self.counts.drain(..gone);
+    }
+
+    /// Makes room for `depth` levels a side.
+    pub(super) fn deepen(&mut self, depth: usize) {
+        let mut deeper = Self::with_depth(depth);
+        for quote in (0..self.len()).filter_map(|k| self.all().get(k)) {
+            deeper.push(quote.time, quote.bids, quote.asks);
+        }
+        *self = deeper;
+    }
+
     /// Their times.
     #[must_use]
     pub fn times(&self) -> &[Timestamp] {

@@ -1,31 +1,51 @@
 //! A backtest under way: feed, strategy, venue and ledger, one event at a time.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::sim2real::Timestamp;
 
+use super::agenda::{Agenda, Due, Phase};
 use super::backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
-use super::blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
-use super::strategy::Window;
+use super::blotter::Blotter;
+use super::desk::Pending;
+use super::known::Known;
+use super::latency::Clocks;
+use super::transit::Transit;
+use super::venue::{Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{
-    Answer, Cash, Daily, Event, EventKind, Feed, InFlight, Increments, Ledger, MoneyError, Orders, Price, Quantity,
-    Reference, Request, Strategy, Trade, Venue, View,
+    Arrival, Cash, Daily, DepthBook, Event, EventKind, Feed, History, Ledger, MoneyError, OrderId, Orders, Price, Reference,
+    Strategy, View,
 };
 
 /// A backtest under way.
 pub struct Session<'d> {
-    setup: &'d Backtest,
-    /// Prices of fills move in these: ticks, unless a mechanism averages over several trades.
-    fill_increments: Vec<Increments>,
+    pub(super) setup: &'d Backtest,
     feed: Feed<'d>,
-    windows: Vec<Window<'d>>,
-    daily: Vec<Daily>,
-    venue: Venue<'d>,
-    ledger: Ledger,
-    orders: Orders,
-    blotter: Blotter,
+    transit: Transit,
+    pub(super) agenda: Agenda,
+    pub(super) clocks: Clocks,
+    pub(super) known: Vec<Known>,
+    pub(super) daily: Vec<Daily>,
+    pub(super) venue: Venue,
+    /// What kind of data the orders of each instrument meet.
+    pub(super) data_of: Vec<EventKind>,
+    /// Orders on their way to the venue.
+    pub(super) sent: BTreeMap<OrderId, (usize, Resting)>,
+    /// What became of orders and is not known yet; how many of them; and what mechanisms added to the fills among them.
+    pub(super) pending: Vec<Option<Pending>>,
+    pub(super) under_way: usize,
+    pub(super) pending_terms: Vec<f64>,
+    pub(super) outcomes: Vec<Outcome>,
+    pub(super) terms: Vec<f64>,
+    /// The bar of each instrument whose open is on the agenda.
+    expected: Vec<Option<usize>>,
+    pub(super) ledger: Ledger,
+    pub(super) orders: Orders,
+    pub(super) blotter: Blotter,
     equity: Vec<EquityPoint>,
     held: Held,
+    rows: usize,
 }
 
 impl fmt::Debug for Session<'_> {
@@ -34,108 +54,295 @@ impl fmt::Debug for Session<'_> {
     }
 }
 
+/// How finely a history knows its market.
+fn detail(history: &History) -> Detail {
+    if !history.order_events().is_empty() {
+        Detail::ByOrder
+    } else if !history.depth().is_empty() {
+        Detail::ByPrice
+    } else if !history.quotes().is_empty() || !history.prints().is_empty() {
+        Detail::Quotes
+    } else {
+        Detail::Bars
+    }
+}
+
 impl<'d> Session<'d> {
     pub(super) fn new(setup: &'d Backtest) -> Self {
         let feed = Feed::new(&setup.histories);
-        let Settings { cash, seed, reference, .. } = setup.settings;
-        let symbols: Vec<&str> = setup.instruments.iter().map(|i| i.symbol.as_str()).collect();
+        let Settings { cash, seed, reference, matching, latencies, .. } = setup.settings.clone();
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
         let origin = feed.peek().unwrap_or_default();
-        let venue = Venue::new(&setup.venue, reference, &setup.histories, &symbols, origin, seed);
-        let averages = venue.averages();
+        let (intrabar, limit_fill, queue) = (matching.intrabar, matching.limit_fill, matching.queue);
+        let depth: Vec<Detail> = setup.histories.iter().map(detail).collect();
+        let known = |(k, detail): (usize, &Detail)| Known {
+            book: matches!(detail, Detail::ByPrice | Detail::ByOrder).then(|| DepthBook::new(setup.increments[k])),
+            ..Known::default()
+        };
+        let known = depth.iter().enumerate().map(known).collect();
+        let data_of = setup.histories.iter().zip(&depth).map(|(history, detail)| match detail {
+            Detail::Bars => EventKind::Bar,
+            Detail::Quotes if history.quotes().is_empty() => EventKind::Trade,
+            Detail::Quotes => EventKind::Quote,
+            Detail::ByPrice | Detail::ByOrder => EventKind::Depth,
+        });
+        let data_of = data_of.collect();
+        let venue = Setup {
+            symbols: setup.instruments.iter().map(|i| i.symbol.as_str()).collect(),
+            increments: &setup.increments,
+            depth,
+            rules: Rules { reference, intrabar, limit_fill, queue, origin },
+            seed,
+        };
+        let venue = Venue::new(&setup.venue, &venue);
         let count = setup.instruments.len();
         Self {
             setup,
-            fill_increments: setup.increments.iter().map(|i| if averages { i.without_tick() } else { *i }).collect(),
             equity: Vec::with_capacity(feed.events() + 1),
             feed,
-            windows: vec![Window::default(); count],
+            transit: Transit::new(count),
+            agenda: Agenda::default(),
+            clocks: Clocks::new(latencies, seed),
+            known,
             daily: vec![Daily::default(); count],
+            blotter: Blotter { conceding: venue.conceding.clone(), ..Blotter::default() },
             venue,
+            data_of,
+            sent: BTreeMap::new(),
+            pending: Vec::new(),
+            under_way: 0,
+            pending_terms: Vec::new(),
+            outcomes: Vec::new(),
+            terms: Vec::new(),
+            expected: vec![None; count],
             ledger: Ledger::new(cash, count),
             orders: Orders::default(),
-            blotter: Blotter::default(),
             held: Held::default(),
+            rows: 0,
         }
     }
 
-    /// Events seen, and events in all.
+    /// Rows of data read, and rows in all.
     #[must_use]
     pub fn progress(&self) -> (usize, usize) {
-        (self.held.events, self.feed.events())
+        (self.rows, self.feed.events())
     }
 
-    /// Lets the next event happen, after all fills before it; none when the data have ended.
+    /// Lets the next event happen that the strategy sees, after all that happens before it; none when the data have ended.
     ///
-    /// A fill at the very time of an event is not seen by it: what is decided at an instant rests on the data of that
-    /// instant, not on what becomes of orders at it.
+    /// What becomes of orders at the very time of an event is not seen by it: what is decided at an instant rests on the data of
+    /// that instant, not on what becomes of orders at it.
     ///
     /// # Errors
     /// As [`Backtest::run`].
     pub fn step(&mut self, strategy: &mut dyn Strategy) -> Result<Option<Event>, BacktestError> {
-        let Some(now) = self.feed.peek() else { return Ok(None) };
-        while self.venue.next_due().is_some_and(|due| due < now) {
-            self.fill_next()?;
+        loop {
+            let (data, shown) = (self.feed.peek(), self.transit.peek());
+            let Some(next) = data.into_iter().chain(shown).min() else { return Ok(None) };
+            if self.agenda.peek().is_some_and(|due| due < (next, Phase::Data)) {
+                if let Some(event) = self.act(Some(strategy))? {
+                    return Ok(Some(event));
+                }
+                continue;
+            }
+            if data == Some(next) {
+                let Some(arrival) = self.feed.next() else { return Ok(None) };
+                self.rows += arrival.end - arrival.row;
+                self.happen(&arrival)?;
+                if self.clocks.feed_is_direct() && arrival.known_at <= next {
+                    return self.show(&arrival, strategy).map(Some);
+                }
+                self.transit.put(self.clocks.shown(arrival.known_at), arrival);
+            } else if let Some((at, arrival)) = self.transit.pop() {
+                let arrival = Arrival { event: Event { time: at, ..arrival.event }, ..arrival };
+                return self.show(&arrival, strategy).map(Some);
+            }
         }
-        let Some((event, row)) = self.feed.next() else { return Ok(None) };
-        self.show(event, row, strategy.lookback().max(1)).map_err(|error| self.money(event, error))?;
-        let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
-        self.account(event.time, equity);
-        let view = View {
-            event,
-            windows: &self.windows,
-            instruments: &self.setup.instruments,
-            increments: &self.setup.increments,
-            ledger: &self.ledger,
-            equity,
-        };
-        strategy.on_event(&view, &mut self.orders);
-        if !self.orders.requests().is_empty() {
-            self.send_all(event.time, equity)?;
-        }
-        Ok(Some(event))
     }
 
-    /// Ends it: fills what met the market by the last event, and leaves what did not as unfilled.
+    /// Ends it: what is due by the last event happens, what is under way is booked, and what met no market stays unfilled.
     ///
     /// # Errors
     /// As [`Backtest::run`].
     pub fn finish(mut self) -> Result<Record, BacktestError> {
         let end = self.equity.last().map_or(Timestamp::MIN, |point| point.time);
         let fills = self.blotter.fills.len();
-        while self.venue.next_due().is_some_and(|due| due <= end) {
-            self.fill_next()?;
+        while self.agenda.peek().is_some_and(|(at, _)| at <= end) || self.under_way > 0 {
+            let Some((at, due)) = self.agenda.pop() else { break };
+            match due {
+                Due::Notice(place) => drop(self.note(place)?),
+                due if at <= end => self.at_venue(at, due)?,
+                _ => {}
+            }
         }
         if self.blotter.fills.len() > fills {
             let equity = self.ledger.equity().map_err(|error| BacktestError::Money { place: "the end".into(), error })?;
             self.equity.push(EquityPoint { time: end, equity: equity.to_f64() });
         }
+        self.held.ambiguous_bars = self.venue.floors.iter().map(|floor| floor.ambiguous_bars()).sum();
         Ok(Record { blotter: self.blotter, equity: self.equity, ledger: self.ledger, held: self.held })
     }
 
-    /// Moves the window of an instrument to include the row that became known, and values what is held of it.
-    #[inline]
-    fn show(&mut self, event: Event, row: usize, lookback: usize) -> Result<(), MoneyError> {
-        let (history, window) = (&self.setup.histories[event.instrument], &mut self.windows[event.instrument]);
-        let start = (row + 1).saturating_sub(lookback);
-        let (price, volume) = match event.kind {
-            EventKind::Bar => {
-                window.bars = &history.bars()[start..=row];
-                let bar = &history.bars()[row];
-                (bar.close, bar.volume)
+    /// What is due next happens: the event it makes for the strategy, if it asked to be woken.
+    fn act(&mut self, strategy: Option<&mut dyn Strategy>) -> Result<Option<Event>, BacktestError> {
+        let Some((at, due)) = self.agenda.pop() else { return Ok(None) };
+        match due {
+            Due::Notice(place) => {
+                let notice = self.note(place)?;
+                if let (Some(notice), Some(strategy)) = (notice, strategy) {
+                    let event = Event { time: at, instrument: notice.instrument, kind: EventKind::Timer };
+                    let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
+                    let (view, orders) = self.view(event, equity);
+                    strategy.on_notice(&view, &notice, orders);
+                    self.send_asked(at, equity);
+                }
+                Ok(None)
             }
-            EventKind::Quote => {
-                window.quotes = history.quotes().between(start, row + 1);
-                // A quote with an empty side has no mid; the last one stands.
-                match window.quotes.last().and_then(|quote| quote.mid()) {
-                    Some(mid) => (Price::nearest(mid)?, 0.0),
-                    None => return Ok(()),
+            Due::Wake => {
+                let event = Event { time: at, instrument: 0, kind: EventKind::Timer };
+                match strategy {
+                    Some(strategy) => self.decide(event, strategy).map(Some),
+                    None => Ok(None),
                 }
             }
+            due => self.at_venue(at, due).map(|()| None),
+        }
+    }
+
+    /// Something happens at the exchange: orders that wait there meet it.
+    #[inline]
+    fn happen(&mut self, arrival: &Arrival) -> Result<(), BacktestError> {
+        let Event { time, instrument, kind } = arrival.event;
+        let history = &self.setup.histories[instrument];
+        let floor = &mut self.venue.floors[instrument];
+        match kind {
+            EventKind::Bar => {
+                if floor.by_bars() && !floor.is_idle() {
+                    let bars = history.bars();
+                    let bar = &bars[arrival.row];
+                    floor.at_row(0, arrival.row);
+                    floor.on_bar(bar, ends_day(bars.get(arrival.row + 1).map(|next| next.open_at), bar.open_at));
+                    self.expect_open(instrument);
+                }
+            }
+            EventKind::Quote => {
+                floor.at_row(1, arrival.row);
+                if let Some(quote) = history.quotes().all().get(arrival.row) {
+                    floor.on_quote(&quote, time);
+                }
+            }
+            EventKind::Trade => {
+                floor.at_row(2, arrival.row);
+                floor.on_print(&history.prints()[arrival.row], time);
+            }
+            EventKind::Depth => {
+                floor.at_row(3, arrival.row);
+                if history.order_events().is_empty() {
+                    history.depth()[arrival.row..arrival.end].iter().for_each(|change| floor.on_depth(change));
+                } else {
+                    history.order_events()[arrival.row..arrival.end].iter().for_each(|event| floor.on_order(event));
+                }
+                floor.look(time);
+            }
+            EventKind::Timer => {}
+        }
+        self.settle(instrument)
+    }
+
+    /// Puts the open of the next bar on the agenda, where an order waits for it.
+    pub(super) fn expect_open(&mut self, instrument: usize) {
+        let floor = &self.venue.floors[instrument];
+        if !floor.by_bars() || floor.is_idle() {
+            return;
+        }
+        let Some(row) = self.feed.next_bar(instrument).filter(|row| self.expected[instrument] != Some(*row)) else { return };
+        let Some(bar) = self.setup.histories[instrument].bars().get(row) else { return };
+        if floor.awaits_open(bar.open_at) {
+            self.expected[instrument] = Some(row);
+            self.agenda.put(bar.open_at, Phase::Opens, Due::Open(instrument));
+        }
+    }
+
+    /// The next bar of an instrument opens.
+    pub(super) fn open_bar(&mut self, instrument: usize) {
+        let Some(row) = self.expected[instrument] else { return };
+        let bars = self.setup.histories[instrument].bars();
+        let first = ends_day(Some(bars[row].open_at), row.checked_sub(1).map_or(Timestamp::MIN, |k| bars[k].open_at));
+        let floor = &mut self.venue.floors[instrument];
+        floor.at_row(0, row);
+        floor.on_open(&bars[row], first);
+    }
+
+    /// Shows the strategy what became known, and sends what it asks for.
+    #[inline]
+    fn show(&mut self, arrival: &Arrival, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {
+        let event = arrival.event;
+        self.learn(arrival, strategy.lookback().max(1)).map_err(|error| self.money(event, error))?;
+        self.decide(event, strategy)
+    }
+
+    fn decide(&mut self, event: Event, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {
+        let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
+        self.account(event.time, equity);
+        let (view, orders) = self.view(event, equity);
+        strategy.on_event(&view, orders);
+        self.send_asked(event.time, equity);
+        Ok(event)
+    }
+
+    fn view(&mut self, event: Event, equity: Cash) -> (View<'_>, &mut Orders) {
+        let view = View {
+            event,
+            known: &self.known,
+            instruments: &self.setup.instruments,
+            increments: &self.setup.increments,
+            ledger: &self.ledger,
+            equity,
         };
-        window.mark = Some(price);
-        self.daily[event.instrument].see(event.time, price, volume);
-        self.ledger.mark(event.instrument, price)
+        (view, &mut self.orders)
+    }
+
+    #[inline]
+    fn send_asked(&mut self, now: Timestamp, equity: Cash) {
+        if !self.orders.requests().is_empty() {
+            self.send_all(now, equity);
+        }
+    }
+
+    /// Takes in what became known, and values what is held by it.
+    #[inline]
+    fn learn(&mut self, arrival: &Arrival, keep: usize) -> Result<(), MoneyError> {
+        let Event { time, instrument, kind } = arrival.event;
+        let (history, known) = (&self.setup.histories[instrument], &mut self.known[instrument]);
+        known.keep = keep;
+        let (price, volume) = match kind {
+            EventKind::Bar => {
+                let bar = history.bars()[arrival.row];
+                known.bars.push(bar, keep);
+                (Some(bar.close), bar.volume)
+            }
+            EventKind::Quote => {
+                known.quotes.push(history.quotes(), arrival.row, keep);
+                // A quote with an empty side has no mid; the last one stands.
+                let mid = known.quotes.newest(1).last().and_then(|quote| quote.mid());
+                (mid.map(Price::nearest).transpose()?, 0.0)
+            }
+            EventKind::Trade => {
+                let print = history.prints()[arrival.row];
+                known.prints.push(print, keep);
+                let alone = history.quotes().is_empty() && known.book.is_none() && history.bars().is_empty();
+                (if alone { Some(Price::nearest(print.price)?) } else { None }, print.size)
+            }
+            EventKind::Depth => (known.learn_depth(history, arrival), 0.0),
+            EventKind::Timer => (None, 0.0),
+        };
+        let Some(price) = price else { return Ok(()) };
+        known.mark = Some(price);
+        self.daily[instrument].see(time, price, volume);
+        if self.clocks.watches() {
+            self.clocks.watch(time, price.to_f64());
+        }
+        self.ledger.mark(instrument, price)
     }
 
     #[inline]
@@ -151,140 +358,14 @@ impl<'d> Session<'d> {
         self.equity.push(EquityPoint { time, equity });
     }
 
-    /// Sends what the strategy asked for, or refuses it.
-    fn send_all(&mut self, now: Timestamp, equity: Cash) -> Result<(), BacktestError> {
-        let mut orders = std::mem::take(&mut self.orders);
-        for request in orders.requests() {
-            match self.admit(request, equity.to_f64()) {
-                Ok(price) => self.send(now, request, price),
-                Err(reason) => {
-                    let Request { instrument, side, quantity } = *request;
-                    self.blotter.reject(Rejection { decided_at: now, instrument, side, quantity, reason });
-                }
-            }
-        }
-        orders.clear();
-        self.orders = orders;
-        Ok(())
-    }
-
-    /// The price at decision of an order that may be sent, or why it may not.
-    fn admit(&self, request: &Request, equity: f64) -> Result<Price, Reason> {
-        let increments = self.setup.increments.get(request.instrument).ok_or(Reason::UnknownInstrument)?;
-        if request.quantity <= Quantity::ZERO {
-            return Err(Reason::NoQuantity);
-        }
-        if !increments.holds(request.quantity) {
-            return Err(Reason::OffLot);
-        }
-        let price = self.windows[request.instrument].mark.ok_or(Reason::NoPrice)?;
-        let (mut before, mut after) = (0.0, 0.0);
-        for (k, (position, window)) in self.ledger.positions().iter().zip(&self.windows).enumerate() {
-            let coming = position.quantity + window.working;
-            let mark = window.mark.unwrap_or_default();
-            before += (mark * coming).to_f64().abs();
-            let then = if k == request.instrument { coming + request.quantity.signed(request.side) } else { coming };
-            after += (mark * then).to_f64().abs();
-        }
-        if after > before && after > self.setup.settings.max_leverage * equity { Err(Reason::Leverage) } else { Ok(price) }
-    }
-
-    fn send(&mut self, now: Timestamp, request: &Request, price: Price) {
-        let Request { instrument, side, quantity } = *request;
-        let order_id = self.blotter.orders.len() as u64 + 1;
-        let (about, daily) = (&self.setup.instruments[instrument], &self.daily[instrument]);
-        let mid = price.to_f64();
-        let order = InFlight {
-            side,
-            role: super::Role::Taker,
-            quantity: quantity.to_f64(),
-            decided_at: now,
-            arrives_at: now,
-            assumed: self.venue.assumed(instrument, side, now).unwrap_or(mid),
-            mid,
-            participation_limit: f64::INFINITY,
-            average_daily_volume: about.average_daily_volume.or_else(|| daily.volume()),
-            daily_volatility: about.daily_volatility.or_else(|| daily.volatility()),
-        };
-        let window = &mut self.windows[instrument];
-        let quote = window.quotes.last();
-        // An order the data are too short for never leaves the way: it stays `working` and `Unfilled`.
-        self.venue.send(order_id, instrument, &order);
-        window.working = window.working + quantity.signed(side);
-        self.blotter.orders.push(Order {
-            order_id,
-            instrument,
-            decided_at: now,
-            side,
-            quantity,
-            decision_price: price,
-            seen_bid: quote.and_then(|quote| quote.bid()),
-            seen_ask: quote.and_then(|quote| quote.ask()),
-            status: Status::Unfilled,
-            filled: Quantity::ZERO,
-        });
-    }
-
-    /// Lets the next order meet the market, and books what was filled.
-    fn fill_next(&mut self) -> Result<(), BacktestError> {
-        let Some(answer) = self.venue.answer() else { return Ok(()) };
-        let Answer { order_id, instrument, time, mid, report } = answer;
-        let Some(order) = self.blotter.orders.get_mut(order_id as usize - 1) else { return Ok(()) };
-        let symbol = &self.setup.instruments[instrument].symbol;
-        let money = |error| BacktestError::Money { place: format!("order {order_id} for {symbol} at {time}"), error };
-        let increments = self.fill_increments[instrument];
-        let window = &mut self.windows[instrument];
-        window.working = window.working - order.quantity.signed(order.side);
-        let reported = Quantity::nearest(report.quantity).map_err(money)?;
-        // A quantity beyond 2^53 steps does not come back from a float as it went in: what is filled whole is whole.
-        let whole = report.filled >= 1.0 || reported >= order.quantity;
-        let quantity = if whole { order.quantity } else { increments.whole_lots(reported) };
-        order.status = if quantity == order.quantity { Status::Filled } else { Status::Cancelled };
-        if quantity <= Quantity::ZERO {
-            return Ok(());
-        }
-        if !report.price.is_finite() || report.price <= 0.0 {
-            return Err(BacktestError::ModelPrice { order_id, symbol: symbol.clone(), time, price: report.price });
-        }
-        order.filled = quantity;
-        let side = order.side;
-        let price = increments.against(side, Price::nearest(report.price).map_err(money)?);
-        if price.0 <= 0 {
-            return Err(BacktestError::ModelPrice { order_id, symbol: symbol.clone(), time, price: report.price });
-        }
-        let fee = Cash::nearest(report.fee).map_err(money)?;
-        let held = self.ledger.positions()[instrument].quantity;
-        let closes = held.signed(side) < Quantity::ZERO;
-        let realised = self.ledger.book(&Trade { instrument, side, price, quantity, fee }).map_err(money)?;
-        let loss = |from: f64, to: f64| side.sign() * (to - from) * quantity.to_f64();
-        let cost = FillCost {
-            timing: loss(order.decision_price.to_f64(), mid),
-            spread_and_impact: loss(mid, report.price),
-            rounding: loss(report.price, price.to_f64()),
-        };
-        for (mechanism, concession) in self.venue.concessions() {
-            *self.blotter.concessions.entry(mechanism).or_default() += concession * quantity.to_f64();
-        }
-        let fill_id = self.blotter.fills.len() as u64 + 1;
-        let realised = closes.then_some(realised);
-        let filled_at = time;
-        self.blotter.fills.push(Fill {
-            fill_id,
-            order_id,
-            instrument,
-            filled_at,
-            side,
-            quantity,
-            price,
-            fee,
-            realised,
-            cost,
-        });
-        Ok(())
-    }
-
     fn money(&self, event: Event, error: MoneyError) -> BacktestError {
         let symbol = &self.setup.instruments[event.instrument].symbol;
         BacktestError::Money { place: format!("{symbol} at {}", event.time), error }
     }
+}
+
+/// Whether `next`, if anything, comes on another day of UTC than `this`.
+fn ends_day(next: Option<Timestamp>, this: Timestamp) -> bool {
+    const DAY: i64 = 86_400 * Timestamp::NANOS;
+    next.is_none_or(|next| next.0.div_euclid(DAY) != this.0.div_euclid(DAY))
 }

@@ -2,15 +2,25 @@
 
 use crate::sim2real::Timestamp;
 
-use super::{Bar, Cash, Increments, Instrument, Ledger, Price, Quantity, QuoteSlice, Side};
+use super::known::Known;
+use super::{
+    Bar, Bracket, Cash, Condition, DepthBook, Increments, Instrument, Ledger, Link, OpenOrder, OrderId, OrderKind, Price,
+    Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Ticket,
+};
 
-/// What brought an event about.
+/// What brought an event about; in the order in which they come at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum EventKind {
     /// A bar became known.
     Bar,
+    /// Trades were printed.
+    Trade,
+    /// The book changed.
+    Depth,
     /// A quote came to be.
     Quote,
+    /// The strategy asked to be woken.
+    Timer,
 }
 
 /// Something that became known.
@@ -24,23 +34,14 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-/// What may be seen of one instrument: slices that end at the present, and hold nothing beyond.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Window<'a> {
-    pub bars: &'a [Bar],
-    pub quotes: QuoteSlice<'a>,
-    pub mark: Option<Price>,
-    /// Sent and not yet filled, cancelled or stranded: positive for buys.
-    pub working: Quantity,
-}
-
 /// The past and the present, as far as a strategy may see them.
 ///
-/// It is made of slices that end at the present: there is no path from here to later data, nor to the venue.
+/// It shows what has become known, which is kept apart from what is still to come: there is no path from here to later data, nor
+/// to the venue.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     pub(super) event: Event,
-    pub(super) windows: &'a [Window<'a>],
+    pub(super) known: &'a [Known],
     pub(super) instruments: &'a [Instrument],
     pub(super) increments: &'a [Increments],
     pub(super) ledger: &'a Ledger,
@@ -75,19 +76,49 @@ impl<'a> View<'a> {
     /// The bars of an instrument known by now, oldest first: at most as many as [`Strategy::lookback`] asks for.
     #[must_use]
     pub fn bars(&self, instrument: usize) -> &'a [Bar] {
-        self.windows.get(instrument).map_or(&[], |window| window.bars)
+        self.known.get(instrument).map_or(&[], |known| known.bars.newest(known.keep))
     }
 
     /// The quotes of an instrument by now, oldest first: at most as many as [`Strategy::lookback`] asks for.
     #[must_use]
     pub fn quotes(&self, instrument: usize) -> QuoteSlice<'a> {
-        self.windows.get(instrument).map_or_else(QuoteSlice::default, |window| window.quotes)
+        self.known.get(instrument).map_or_else(QuoteSlice::default, |known| known.quotes.newest(known.keep))
+    }
+
+    /// The trades printed of an instrument by now, oldest first: at most as many as [`Strategy::lookback`] asks for.
+    #[must_use]
+    pub fn prints(&self, instrument: usize) -> &'a [Print] {
+        self.known.get(instrument).map_or(&[], |known| known.prints.newest(known.keep))
+    }
+
+    /// The book of an instrument as far as it is known by now, where its data have one.
+    #[must_use]
+    pub fn book(&self, instrument: usize) -> Option<&'a DepthBook> {
+        self.known.get(instrument)?.book.as_ref()
+    }
+
+    /// The best price displayed on `side` (bids: [`Side::Buy`]), by the book or else the last quote.
+    #[must_use]
+    pub fn best(&self, instrument: usize, side: Side) -> Option<Price> {
+        let known = self.known.get(instrument)?;
+        if let Some(book) = &known.book {
+            return book.best(side);
+        }
+        let quote = known.quotes.newest(1).last()?;
+        let best = if side == Side::Buy { quote.bid() } else { quote.ask() };
+        Price::nearest(best?).ok()
+    }
+
+    /// Our orders of an instrument that work, as far as is known, the oldest first.
+    #[must_use]
+    pub fn orders(&self, instrument: usize) -> &'a [OpenOrder] {
+        self.known.get(instrument).map_or(&[], |known| &known.orders)
     }
 
     /// The latest price of an instrument: the close of its last bar, or its last mid.
     #[must_use]
     pub fn price(&self, instrument: usize) -> Option<Price> {
-        self.windows.get(instrument)?.mark
+        self.known.get(instrument)?.mark
     }
 
     /// What is held of an instrument, negative when short.
@@ -96,10 +127,11 @@ impl<'a> View<'a> {
         self.ledger.positions().get(instrument).map_or(Quantity::ZERO, |position| position.quantity)
     }
 
-    /// What was ordered of an instrument and has not met the market yet: positive for buys.
+    /// What is under way of an instrument and would change the position: positive for buys. Orders that only close what is
+    /// held are left out.
     #[must_use]
     pub fn working(&self, instrument: usize) -> Quantity {
-        self.windows.get(instrument).map_or(Quantity::ZERO, |window| window.working)
+        self.known.get(instrument).map_or(Quantity::ZERO, |known| known.working)
     }
 
     /// Cash in hand.
@@ -126,27 +158,67 @@ impl<'a> View<'a> {
     }
 }
 
-/// An order a strategy asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Request {
-    /// Number of the instrument.
-    pub instrument: usize,
-    /// Which way.
-    pub side: Side,
-    /// How much.
-    pub quantity: Quantity,
-}
-
-/// Collects the orders a strategy asks for at one event.
+/// Collects what a strategy asks for at one event.
 #[derive(Debug, Clone, Default)]
 pub struct Orders {
     requests: Vec<Request>,
+    /// Orders asked for so far in the run.
+    asked: u64,
 }
 
 impl Orders {
+    /// Asks for an order, and gives its id.
+    pub fn submit(&mut self, ticket: Ticket) -> OrderId {
+        self.asked += 1;
+        let id = OrderId(self.asked);
+        self.requests.push(Request::Submit(id, ticket));
+        id
+    }
+
     /// Asks for a market order.
-    pub fn market(&mut self, instrument: usize, side: Side, quantity: Quantity) {
-        self.requests.push(Request { instrument, side, quantity });
+    pub fn market(&mut self, instrument: usize, side: Side, quantity: Quantity) -> OrderId {
+        self.submit(Ticket::market(instrument, side, quantity))
+    }
+
+    /// Asks for a limit order that works until it is filled or cancelled.
+    pub fn limit(&mut self, instrument: usize, side: Side, quantity: Quantity, price: Price) -> OrderId {
+        self.submit(Ticket::limit(instrument, side, quantity, price))
+    }
+
+    /// Asks for an entry and two exits that wait for it: what the entry fills may leave with a gain at `take_profit` or with a
+    /// loss at `stop_loss`, and one cancels the other.
+    pub fn bracket(&mut self, entry: Ticket, take_profit: Price, stop_loss: Price) -> Bracket {
+        let parent = self.submit(entry);
+        let exit = |kind| {
+            Ticket::new(entry.instrument, entry.side.opposite(), entry.quantity, kind)
+                .linked(Link::ChildOf { parent })
+                .on(Condition::ReduceOnly)
+        };
+        let take_profit = self.submit(exit(OrderKind::Limit { price: take_profit }));
+        let stop_loss = self.submit(exit(OrderKind::Stop { trigger: stop_loss }));
+        Bracket { entry: parent, take_profit, stop_loss }
+    }
+
+    /// Asks for orders of one instrument of which one cancels the others: what one fills, the others no longer do. Gives their
+    /// ids, which follow one another.
+    pub fn one_cancels_other(&mut self, tickets: &[Ticket]) -> Vec<OrderId> {
+        let group = OrderId(self.asked + 1);
+        tickets.iter().map(|ticket| self.submit(ticket.linked(Link::OneCancelsOther { group }))).collect()
+    }
+
+    /// Asks to take an order back.
+    pub fn cancel(&mut self, id: OrderId) {
+        self.requests.push(Request::Cancel(id));
+    }
+
+    /// Asks to change an order: its quantity in all, what was filled included, and its limit, or the trigger of a stop.
+    pub fn replace(&mut self, id: OrderId, quantity: Option<Quantity>, price: Option<Price>) {
+        self.requests.push(Request::Replace { id, quantity, price });
+    }
+
+    /// Asks to be woken at an instant, or at once where that is past.
+    pub fn wake_at(&mut self, time: Timestamp) {
+        self.requests.push(Request::Wake(time));
     }
 
     /// Asks for the market order that takes the position of `instrument`, with what is on its way, to `target`; for none
@@ -156,8 +228,8 @@ impl Orders {
         match missing.0.signum() {
             1 => self.market(instrument, Side::Buy, missing),
             -1 => self.market(instrument, Side::Sell, missing.abs()),
-            _ => {}
-        }
+            _ => return,
+        };
     }
 
     /// What was asked for.
@@ -166,10 +238,47 @@ impl Orders {
         &self.requests
     }
 
-    /// Forgets it all.
+    /// Forgets it all; numbers go on.
     pub fn clear(&mut self) {
         self.requests.clear();
     }
+}
+
+/// What became of an order, as it becomes known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Notice {
+    /// The order.
+    pub order_id: OrderId,
+    /// Number of its instrument.
+    pub instrument: usize,
+    /// Its side.
+    pub side: Side,
+    /// When it happened.
+    pub at: Timestamp,
+    /// What happened.
+    pub news: News,
+}
+
+/// What can become of an order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum News {
+    /// Some of it was filled.
+    Filled {
+        /// How much.
+        quantity: Quantity,
+        /// At which price.
+        price: Price,
+        /// As what.
+        role: Role,
+        /// How much of it is left.
+        left: Quantity,
+    },
+    /// It works no longer, though some of it is left.
+    Ended(Reason),
+    /// Its stop was set off.
+    SetOff,
+    /// It was changed as asked.
+    Replaced,
 }
 
 /// Decides what to trade.
@@ -187,4 +296,6 @@ pub trait Strategy: Send {
     fn lookback(&self) -> usize;
     /// Sees that something became known, and may ask for orders.
     fn on_event(&mut self, view: &View<'_>, orders: &mut Orders);
+    /// Learns what became of one of its orders, and may ask for more.
+    fn on_notice(&mut self, _view: &View<'_>, _notice: &Notice, _orders: &mut Orders) {}
 }

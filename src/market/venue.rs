@@ -1,13 +1,35 @@
-//! Where orders meet the market: the assembly identified from recorded fills, or any other, run on the histories.
+//! Where orders meet the market: one floor an instrument, each an assembly of the plant every order meets.
+//!
+//! - **Bars**: an order meets the first bar that opens at or after its arrival, at its open and never at a price already seen;
+//!   what rests then meets the prices on the way within each bar, in an order that is a stated rule ([`Intrabar`]).
+//! - **Displayed prices** (quotes, or the whole book), which go before bars: an order without delay meets what the instant of its
+//!   decision leaves, one with a delay what was displayed strictly before its arrival. Where the side it needs is empty, it
+//!   waits. A resting order has a place in the queue at its price ([`QueueModel`]); it is filled when trades have used up
+//!   what stood ahead of it, or when others show a price at or beyond its own.
+//!
+//! A replayed history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+mod bars;
+mod by_order;
+mod displayed;
+mod floor;
+mod path;
+mod queue;
+mod resting;
+mod shown;
 
 use serde::{Deserialize, Serialize};
 
-use crate::sim2real::{Assembly, Run, Seed, Simulator, Site, Thetas, Tick, Timestamp, Twin};
+use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
 
-use super::{Book, Execution, History, InFlight, Met, Report, Side};
+use super::{Book, DepthBook, Execution, InFlight, Increments, OrderKind, Quantity, Side};
+
+pub use path::Intrabar;
+pub use queue::QueueModel;
+
+pub(super) use by_order::Others;
+pub(super) use floor::{Floor, Rules};
+pub(super) use resting::{Filled, Outcome, Resting, What};
 
 /// The price mechanisms start from where there are quotes. Where there are bars only it is the open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,7 +50,9 @@ impl Reference {
         if adds_spread { Self::Mid } else { Self::Touch }
     }
 
-    fn of(self, book: &Book, side: Side) -> Option<f64> {
+    /// The price of `book` it stands for, for an order of `side`.
+    #[must_use]
+    pub fn of(self, book: &Book, side: Side) -> Option<f64> {
         match self {
             Self::Mid => book.mid(),
             Self::Touch => book.touch(side),
@@ -36,252 +60,174 @@ impl Reference {
     }
 }
 
-/// An order on its way, and where it will meet the market.
-#[derive(Debug, Clone, Copy)]
-struct Waiting {
-    instrument: usize,
-    order: InFlight,
-    meets: Meeting,
+/// How far the market must go for a resting limit order to be filled, where nothing is known of the queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitFill {
+    /// A tick beyond the limit: then whoever stood ahead was filled too.
+    #[default]
+    Through,
+    /// To the limit: as if nobody stood ahead, which flatters.
+    Touch,
 }
 
-/// Row of the bar or quote an order meets.
-#[derive(Debug, Clone, Copy)]
-enum Meeting {
-    Bar(usize),
-    Quote(usize),
-}
-
-/// What the market did with an order.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answer {
-    /// Which order.
-    pub order_id: u64,
-    /// Number of the instrument.
-    pub instrument: usize,
-    /// When it met the market.
-    pub time: Timestamp,
-    /// Open or mid it met [currency].
-    pub mid: f64,
-    /// What is reported.
-    pub report: Report,
-}
-
-/// Where orders meet the market.
-///
-/// - Bars: an order meets the first bar that opens at or after its arrival, at its open and never at a price already
-///   seen. It may take part in the whole bar's volume, which the venue knows and the strategy does not.
-/// - Quotes, which go before bars: an order without delay meets the last quote at or before its decision, one with a
-///   delay the last quote before its arrival. Where the side it needs is empty, it waits for the first quote that has it.
-///   It may take part in what is displayed on that side.
-///
-/// Each instrument has a run of its own, so that an impact that lasts stays with the instrument it was made in. A replayed
-/// history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only.
-#[derive(Debug)]
-pub struct Venue<'d> {
-    histories: &'d [History],
-    runs: Vec<Run<Execution>>,
-    reference: Reference,
-    averages: bool,
-    /// Ids of the mechanisms that act on prices, in their order; and what each added to the price of the last answer
-    /// [currency].
-    conceding: Vec<&'static str>,
-    concessions: Vec<f64>,
-    /// Row of each instrument's history that the last order met, or would have without a delay: later ones look on from it.
-    since: Vec<usize>,
-    /// Orders on their way by when they meet the market, and which comes first at one time; and their places in `orders`.
-    due: BinaryHeap<Reverse<(Timestamp, u64, usize)>>,
-    orders: Vec<Waiting>,
-    free: Vec<usize>,
-    origin: Timestamp,
-    messages: usize,
-}
-
-impl<'d> Venue<'d> {
-    /// A venue of `assembly` on `histories`, one an instrument called as in `symbols`; the clock of its mechanisms starts at
-    /// `origin`.
+impl LimitFill {
+    /// Its word in reports.
     #[must_use]
-    pub fn new(
-        assembly: &Assembly<Execution>,
-        reference: Reference,
-        histories: &'d [History],
-        symbols: &[&str],
-        origin: Timestamp,
-        seed: Seed,
-    ) -> Self {
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Through => "when the price goes a tick beyond the limit",
+            Self::Touch => "when the price reaches the limit",
+        }
+    }
+}
+
+/// How orders are matched, as far as that is no mechanism.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Matching {
+    /// Which extreme of a bar comes first.
+    pub intrabar: Intrabar,
+    /// How far the market must go for a limit order to be filled.
+    pub limit_fill: LimitFill,
+    /// How the queue at a price moves.
+    pub queue: QueueModel,
+}
+
+/// The floors of all instruments, and what their laws are called.
+pub(super) struct Venue {
+    pub floors: Vec<Floor>,
+    /// Ids of the mechanisms that act on prices, in their order.
+    pub conceding: Vec<&'static str>,
+}
+
+/// What a venue is made of beside its mechanisms.
+pub(super) struct Setup<'a> {
+    pub symbols: Vec<&'a str>,
+    pub increments: &'a [Increments],
+    /// Of each instrument: whether its data know the whole book, the orders of others one by one, and whether bars are all
+    /// there is.
+    pub depth: Vec<Detail>,
+    pub rules: Rules,
+    pub seed: Seed,
+}
+
+/// How finely the data of an instrument are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Detail {
+    /// Bars alone.
+    Bars,
+    /// Quotes, or trades.
+    Quotes,
+    /// The whole book, by price.
+    ByPrice,
+    /// The whole book, by order.
+    ByOrder,
+}
+
+impl Venue {
+    pub fn new(assembly: &Assembly<Execution>, setup: &Setup<'_>) -> Self {
         let values: Vec<f64> = assembly.parameters().iter().map(|p| p.nominal).collect();
         let thetas = Thetas::single(&values);
         let still = Thetas::single(&[]);
-        let runs = symbols.iter().map(|symbol| assembly.run(&thetas, &still, seed.child(symbol))).collect();
-        let (due, orders, free) = (BinaryHeap::new(), Vec::new(), Vec::new());
+        // Prices of an order that walks the book are averages over several trades, which lie between ticks.
         let averages = assembly.modelled().contains(&"book_walk");
         let at_plant = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Plant);
         let conceding: Vec<&'static str> = at_plant.map(|about| about.name).collect();
-        let concessions = vec![0.0; conceding.len()];
-        let since = vec![0; histories.len()];
-        Self { histories, runs, reference, averages, conceding, concessions, since, due, orders, free, origin, messages: 0 }
-    }
-
-    /// Whether the prices it reports may be averages over several trades, which lie between ticks.
-    #[must_use]
-    pub fn averages(&self) -> bool {
-        self.averages
-    }
-
-    /// What each mechanism added to the price of the last answer, against the order positive [currency], by its id.
-    pub fn concessions(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.conceding.iter().copied().zip(self.concessions.iter().copied())
-    }
-
-    /// The price an order of `side` for `instrument` would meet if it arrived as it is decided and nothing stood between:
-    /// what the backtest assumes [currency]. Decisions come in the order of time.
-    #[must_use]
-    pub fn assumed(&mut self, instrument: usize, side: Side, decided_at: Timestamp) -> Option<f64> {
-        let history = self.histories.get(instrument)?;
-        match self.meets(instrument, side, decided_at, decided_at)?.1 {
-            Meeting::Bar(row) => {
-                self.since[instrument] = row;
-                history.bars().get(row).map(|bar| bar.open.to_f64())
+        let floor = |(number, symbol): (usize, &&str)| {
+            let run = assembly.run(&thetas, &still, setup.seed.child(symbol));
+            let increments = setup.increments[number];
+            let mut floor = Floor::new(number, increments, averages, conceding.len(), setup.rules, run);
+            match setup.depth[number] {
+                Detail::Bars => floor.by_bars = true,
+                Detail::Quotes => {}
+                detail => {
+                    floor.shown = shown::Shown::Depth(Box::new(DepthBook::new(increments)));
+                    floor.by_order = detail == Detail::ByOrder;
+                }
             }
-            Meeting::Quote(row) => self.reference.of(&history.quotes().all().get(row)?.book(), side),
-        }
-    }
-
-    /// Sends an order for `instrument`, and says whether the history is long enough for it to meet the market.
-    pub fn send(&mut self, order_id: u64, instrument: usize, order: &InFlight) -> bool {
-        let tick = self.tick(order.decided_at);
-        let Some(run) = self.runs.get_mut(instrument) else { return false };
-        let Some(order) = run.send(tick, order).first().copied() else { return false };
-        let met = self.meets(instrument, order.side, order.decided_at, order.arrives_at);
-        let Some((time, meets)) = met else { return false };
-        let waiting = Waiting { instrument, order, meets };
-        let place = match self.free.pop() {
-            Some(place) => {
-                self.orders[place] = waiting;
-                place
-            }
-            None => {
-                self.orders.push(waiting);
-                self.orders.len() - 1
-            }
+            floor
         };
-        self.due.push(Reverse((time, order_id, place)));
-        true
+        let floors = setup.symbols.iter().enumerate().map(floor).collect();
+        Self { floors, conceding }
+    }
+}
+
+impl Floor {
+    /// Orders that were sent together arrive.
+    pub fn arrive(&mut self, orders: Vec<Resting>, at: Timestamp) {
+        let first = self.resting.len();
+        self.resting.extend(orders);
+        if !self.by_bars {
+            for k in first..self.resting.len() {
+                if self.resting[k].left > Quantity::ZERO {
+                    self.meet_shown(k, at);
+                }
+            }
+        }
+        self.sweep(at);
     }
 
-    /// When the next order meets the market.
+    /// Orders for the opening or the close that no bar told apart: with quotes they trade with what is displayed then.
+    pub fn auction(&mut self, at: Timestamp, opens: bool) {
+        for k in 0..self.resting.len() {
+            let order = &mut self.resting[k];
+            let kind = match (order.kind, opens) {
+                (OrderKind::MarketOnOpen, true) | (OrderKind::MarketOnClose, false) => OrderKind::Market,
+                (OrderKind::LimitOnOpen { price }, true) | (OrderKind::LimitOnClose { price }, false) => {
+                    OrderKind::Limit { price }
+                }
+                _ => continue,
+            };
+            order.kind = kind;
+            order.time_in_force = super::TimeInForce::ImmediateOrCancel;
+            self.meet_shown(k, at);
+        }
+        self.sweep(at);
+    }
+
+    /// How far bars left open what was filled.
+    pub fn ambiguous_bars(&self) -> usize {
+        self.ambiguous
+    }
+
+    /// Shapes an order as command laws do, with room for what it may become.
+    pub fn accept(&mut self, order: &InFlight) -> InFlight {
+        self.shape(order)
+    }
+
+    /// Takes what happened since the last time, with what mechanisms added to each fill.
+    pub fn drain(&mut self, outcomes: &mut Vec<Outcome>, terms: &mut Vec<f64>) {
+        outcomes.append(&mut self.outcomes);
+        terms.append(&mut self.terms);
+    }
+
+    /// Whether anything happened since the last time.
     #[inline]
-    #[must_use]
-    pub fn next_due(&self) -> Option<Timestamp> {
-        self.due.peek().map(|Reverse((time, ..))| *time)
+    pub fn is_quiet(&self) -> bool {
+        self.outcomes.is_empty()
     }
 
-    /// Lets the next order meet the market.
-    pub fn answer(&mut self) -> Option<Answer> {
-        let Reverse((time, order_id, place)) = self.due.pop()?;
-        self.free.push(place);
-        let Waiting { instrument, order, meets, .. } = self.orders[place];
-        let (mid, met) = self.meeting(instrument, &order, meets)?;
-        let tick = self.tick(time);
-        let run = self.runs.get_mut(instrument)?;
-        run.deliver(&[order]);
-        let (concessions, mut before) = (&mut self.concessions, 0.0);
-        run.advance_seen(
-            tick,
-            |_| met,
-            |law, effects| {
-                let after = effects.first().map_or(0.0, |effect| effect.concession);
-                if let Some(own) = concessions.get_mut(law) {
-                    *own = after - before;
-                }
-                before = after;
-            },
-        );
-        let report = *run.observe(tick.time).first()?;
-        Some(Answer { order_id, instrument, time, mid, report })
+    /// Whether no order waits here.
+    #[inline]
+    pub fn is_idle(&self) -> bool {
+        self.resting.is_empty()
     }
 
-    /// The mid and all else that `order` meets.
-    fn meeting(&self, instrument: usize, order: &InFlight, meets: Meeting) -> Option<(f64, Met)> {
-        let history = self.histories.get(instrument)?;
-        match meets {
-            Meeting::Bar(row) => {
-                let bar = history.bars().get(row)?;
-                let open = bar.open.to_f64();
-                Some((open, Met { book: Book::at_price(bar.open_at, open), reference: open, volume: bar.volume }))
-            }
-            Meeting::Quote(row) => {
-                let book = history.quotes().all().get(row)?.book();
-                let reference = self.reference.of(&book, order.side)?;
-                let volume = book.opposite(order.side).iter().map(|level| level.size).sum();
-                Some((book.mid().unwrap_or(reference), Met { book, reference, volume }))
-            }
-        }
+    /// The data have come to a row of a kind: 0 bars, 1 quotes, 2 trades, 3 changes of the book.
+    #[inline]
+    pub fn at_row(&mut self, kind: usize, row: usize) {
+        self.rows[kind] = row;
     }
 
-    /// When and where an order meets the market.
-    fn meets(
-        &self,
-        instrument: usize,
-        side: Side,
-        decided_at: Timestamp,
-        arrives_at: Timestamp,
-    ) -> Option<(Timestamp, Meeting)> {
-        let history = self.histories.get(instrument)?;
-        if history.quotes().is_empty() {
-            let bars = history.bars();
-            let row = first_from(self.since[instrument], bars.len(), |row| bars[row].open_at < arrives_at);
-            return bars.get(row).map(|bar| (bar.open_at, Meeting::Bar(row)));
-        }
-        let quotes = history.quotes().all();
-        // What carries the stamp of the decision was known by then; what carries that of the arrival was not.
-        let seen = quotes.times().partition_point(|time| *time < arrives_at || *time <= decided_at);
-        let usable = |row: &usize| quotes.get(*row).is_some_and(|quote| self.reference.of(&quote.book(), side).is_some());
-        if let Some(row) = seen.checked_sub(1).filter(usable) {
-            return Some((arrives_at, Meeting::Quote(row)));
-        }
-        let row = (seen..quotes.len()).find(usable)?;
-        Some((quotes.times()[row].max(arrives_at), Meeting::Quote(row)))
+    /// Whether bars are all there is.
+    #[inline]
+    pub fn by_bars(&self) -> bool {
+        self.by_bars
     }
 
-    fn tick(&mut self, time: Timestamp) -> Tick {
-        let index = self.messages;
-        self.messages += 1;
-        Tick { index, time: time.seconds_since(self.origin), step: 0.0 }
-    }
-}
-
-/// The first row from `start` on that is not `before`, or `rows` where all are: found in steps that double, for it is
-/// most often near.
-fn first_from(start: usize, rows: usize, before: impl Fn(usize) -> bool) -> usize {
-    let (mut low, mut step) = (start, 1);
-    while low + step <= rows && before(low + step - 1) {
-        low += step;
-        step *= 2;
-    }
-    let mut high = (low + step).min(rows);
-    while low < high {
-        let middle = low + (high - low) / 2;
-        if before(middle) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    low
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_first_row_is_found_from_anywhere_before_it() {
-        for rows in 0..40 {
-            for answer in 0..=rows {
-                for start in 0..=answer {
-                    assert_eq!(first_from(start, rows, |row| row < answer), answer, "from {start} of {rows}");
-                }
-            }
-        }
+    /// Prices at which orders of a side rest: only tests ask.
+    #[cfg(test)]
+    pub fn limits(&self, side: Side) -> Vec<super::Price> {
+        self.resting.iter().filter(|order| order.side == side).filter_map(|order| order.kind.limit()).collect()
     }
 }

@@ -101,7 +101,7 @@ impl Metrics {
             realised += position.realised.to_f64();
             unrealised += position.value().minus(position.basis)?.to_f64();
         }
-        let Held { events, invested, leverage } = record.held;
+        let Held { events, invested, leverage, .. } = record.held;
         let per_event = |sum: f64| if events > 0 { Some(sum / events as f64) } else { None };
         let returns = Returns::of(points);
         Ok(Self {

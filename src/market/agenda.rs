@@ -1,0 +1,89 @@
+//! What is due: messages on their way, bars that open, orders that expire; in the order of time.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::sim2real::Timestamp;
+
+use super::{OrderId, Price, Quantity};
+
+/// What comes first at one instant.
+///
+/// What was sent earlier and arrives now meets the market as it was before the data of this instant; what is decided now, without a
+/// delay, meets the market with all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Phase {
+    /// Before the data of the instant.
+    Before,
+    /// The data themselves.
+    Data,
+    /// What ends with the instant.
+    Ends,
+    /// Messages that took no time.
+    AtOnce,
+    /// Bars that open.
+    Opens,
+    /// What became of orders: nothing that is decided at an instant rests on it.
+    Notices,
+}
+
+/// Something due.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Due {
+    /// An order arrives at the venue, with those that were sent with it.
+    Arrive(OrderId),
+    /// The request to take an order back arrives.
+    Cancel(OrderId),
+    /// The request to change an order arrives.
+    Replace(OrderId, Option<Quantity>, Option<Price>),
+    /// A bar of an instrument opens.
+    Open(usize),
+    /// An order's time is over.
+    Expire(OrderId),
+    /// What became of an order is known to its owner: the place of the notice.
+    Notice(usize),
+    /// The strategy asked to be woken.
+    Wake,
+}
+
+/// What is due, in the order of time, phase, and then in the order in which it was put down.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Agenda {
+    due: BinaryHeap<Reverse<(Timestamp, Phase, u64, Due)>>,
+    entries: u64,
+}
+
+impl Agenda {
+    pub fn put(&mut self, at: Timestamp, phase: Phase, due: Due) {
+        self.entries += 1;
+        self.due.push(Reverse((at, phase, self.entries, due)));
+    }
+
+    /// When the next is due, and in which phase.
+    #[inline]
+    pub fn peek(&self) -> Option<(Timestamp, Phase)> {
+        self.due.peek().map(|Reverse((at, phase, ..))| (*at, *phase))
+    }
+
+    pub fn pop(&mut self) -> Option<(Timestamp, Due)> {
+        self.due.pop().map(|Reverse((at, _, _, due))| (at, due))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_one_instant_phases_come_in_order_and_then_what_was_put_down_first() {
+        let mut agenda = Agenda::default();
+        let at = Timestamp;
+        for (time, phase, id) in
+            [(5, Phase::AtOnce, 1), (5, Phase::Before, 2), (4, Phase::Notices, 3), (5, Phase::AtOnce, 4)]
+        {
+            agenda.put(at(time), phase, Due::Arrive(OrderId(id)));
+        }
+        let order: Vec<Due> = std::iter::from_fn(|| agenda.pop().map(|(_, due)| due)).collect();
+        assert_eq!(order, [3, 2, 1, 4].map(|id| Due::Arrive(OrderId(id))));
+    }
+}

@@ -1,0 +1,292 @@
+//! Matching against what is displayed: quotes, or the whole book, and the trades that are printed.
+
+use crate::market::{
+    Condition, DepthAction, DepthChange, OrderKind, Price, Print, Quantity, Quote, Reason, Side, TimeInForce,
+};
+use crate::sim2real::Timestamp;
+
+use super::floor::{Floor, Offer};
+use super::queue::Place;
+use super::shown::Shown;
+use super::{LimitFill, Resting, What};
+
+impl Floor {
+    /// Order `k` arrives, with what the market shows now.
+    pub(super) fn meet_shown(&mut self, k: usize, at: Timestamp) {
+        let order = self.resting[k];
+        if order.tradable() <= Quantity::ZERO {
+            return;
+        }
+        let Some(touch) = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok()) else {
+            // Nothing to take: what cannot wait is over, the rest waits.
+            return self.wait_or_end(k, at);
+        };
+        self.resting[k].follow(touch);
+        if order.waits() {
+            if !self.resting[k].set_off_by(touch) {
+                return self.wait_or_end(k, at);
+            }
+            self.resting[k].set_off();
+            self.tell(order.id, at, What::SetOff);
+        }
+        let order = self.resting[k];
+        let takes = match order.kind {
+            OrderKind::Market => true,
+            OrderKind::Limit { .. } => order.accepts(touch),
+            _ => false,
+        };
+        if takes && order.condition == Condition::PostOnly {
+            return self.end(k, at, Reason::PostOnly);
+        }
+        if takes {
+            // A market order takes whatever its size, as diagnosis has it; a limit order what is displayed within its limit.
+            let within = match order.kind {
+                OrderKind::Market => Quantity(i64::MAX),
+                _ => quantity_of(self.shown.takable(order.side, order.limit())),
+            };
+            let whole = within >= order.tradable();
+            if (whole || order.time_in_force != TimeInForce::FillOrKill)
+                && let Some(offer) = self.offer_shown(order.side, at)
+            {
+                self.take(k, &offer, within);
+            }
+        }
+        self.wait_or_end(k, at);
+    }
+
+    /// What is left of an order that has met the market: it waits, or is over.
+    fn wait_or_end(&mut self, k: usize, at: Timestamp) {
+        let order = self.resting[k];
+        if order.left <= Quantity::ZERO {
+            return;
+        }
+        let reason = match (order.time_in_force, order.kind) {
+            (TimeInForce::FillOrKill, _) => Some(Reason::FillOrKill),
+            (TimeInForce::ImmediateOrCancel, _) => Some(Reason::TimeInForce),
+            (_, OrderKind::Market) if order.met && !order.waits_for_parent() => Some(Reason::NoVolume),
+            _ => None,
+        };
+        match reason {
+            Some(reason) => self.end(k, at, reason),
+            None => self.join(k, at),
+        }
+    }
+
+    /// An order with a limit joins the end of the queue at its price.
+    pub(super) fn join(&mut self, k: usize, _at: Timestamp) {
+        let order = &self.resting[k];
+        if let (OrderKind::Limit { price }, true) = (order.kind, order.place == Place::default()) {
+            self.resting[k].place = Place::behind(self.shown.displayed_at(order.side, price));
+        }
+    }
+
+    /// A new quote stands.
+    #[inline]
+    pub fn on_quote(&mut self, quote: &Quote<'_>, at: Timestamp) {
+        if matches!(self.shown, Shown::Depth(_)) {
+            return;
+        }
+        let book = quote.book();
+        if self.resting.is_empty() {
+            self.shown = Shown::Quote(book);
+            return;
+        }
+        let before = std::mem::replace(&mut self.shown, Shown::Quote(book));
+        for order in &mut self.resting {
+            if let OrderKind::Limit { price } = order.kind {
+                let (was, is) = (before.displayed_at(order.side, price), self.shown.displayed_at(order.side, price));
+                if was.is_finite() && is.is_finite() {
+                    order.place.displayed(self.rules.queue, was, is);
+                } else if is.is_finite() {
+                    // The price has come into view: no more can be ahead than is there.
+                    order.place.displayed(self.rules.queue, is, is);
+                }
+            }
+        }
+        self.look(at);
+    }
+
+    /// A level changes. What an instant brings is complete when [`Floor::look`] is called.
+    #[inline]
+    pub fn on_depth(&mut self, change: &DepthChange) {
+        let Shown::Depth(book) = &mut self.shown else { return };
+        if !self.resting.is_empty() {
+            for order in &mut self.resting {
+                if order.side == change.side
+                    && let OrderKind::Limit { price } = order.kind
+                {
+                    let was = book.size(order.side, price);
+                    match change.action {
+                        DepthAction::Set if price == change.price => {
+                            order.place.displayed(self.rules.queue, was, change.size);
+                        }
+                        // A snapshot says anew what is there; until it does, nothing is known to have gone.
+                        _ => {}
+                    }
+                }
+            }
+        }
+        book.apply(change);
+    }
+
+    /// All changes of an instant are in: what they let trade does.
+    #[inline]
+    pub fn look(&mut self, at: Timestamp) {
+        if let Shown::Depth(book) = &mut self.shown {
+            book.settle();
+        }
+        self.taken = 0.0;
+        if self.resting.is_empty() {
+            return;
+        }
+        for k in 0..self.resting.len() {
+            self.look_at(k, at);
+        }
+        self.sweep(at);
+    }
+
+    fn look_at(&mut self, k: usize, at: Timestamp) {
+        let order = self.resting[k];
+        if order.tradable() <= Quantity::ZERO {
+            return;
+        }
+        match order.kind {
+            OrderKind::Limit { price } => {
+                let crossed = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok());
+                let Some(offer) =
+                    crossed.filter(|touch| reaches(order.side, *touch, price)).and_then(|_| self.offer_at(price, at))
+                else {
+                    return;
+                };
+                // Whoever shows a price at or beyond our limit has passed us by: we stood before them.
+                self.make(k, &offer, order.tradable());
+            }
+            _ if order.waits() => {
+                let Some(price) = self.stop_price(order.side) else { return };
+                self.resting[k].follow(price);
+                if self.resting[k].set_off_by(price) {
+                    self.meet_shown(k, at);
+                }
+            }
+            OrderKind::Market => self.meet_shown(k, at),
+            _ => {}
+        }
+    }
+
+    /// The market prints a trade.
+    pub fn on_print(&mut self, print: &Print, at: Timestamp) {
+        let Ok(price) = Price::nearest(print.price) else { return };
+        if matches!(self.shown, Shown::Nothing | Shown::Last(_)) {
+            self.shown = Shown::Last(price);
+            self.taken = 0.0;
+        }
+        if self.resting.is_empty() {
+            return;
+        }
+        for k in 0..self.resting.len() {
+            let order = self.resting[k];
+            if order.tradable() <= Quantity::ZERO {
+                continue;
+            }
+            if order.waits() {
+                self.resting[k].follow(price);
+                if self.resting[k].set_off_by(price) {
+                    self.resting[k].set_off();
+                    self.tell(order.id, at, What::SetOff);
+                    self.meet_shown(k, at);
+                }
+                continue;
+            }
+            let OrderKind::Limit { price: limit } = order.kind else {
+                if order.kind == OrderKind::Market {
+                    self.meet_shown(k, at);
+                }
+                continue;
+            };
+            // A trade that took from our own side says nothing of whoever rests on the other.
+            if print.aggressor == Some(order.side) || !reaches(order.side, price, limit) {
+                continue;
+            }
+            let reached = if price == limit {
+                match (self.rules.limit_fill, &self.shown) {
+                    // Without a book nobody knows what stands ahead: the price has to go beyond the limit.
+                    (LimitFill::Through, Shown::Last(_)) => 0.0,
+                    (LimitFill::Touch, Shown::Last(_)) => print.size,
+                    // By-order data say themselves who left the queue.
+                    _ if self.by_order => self.resting[k].place.reached(print.size),
+                    _ => self.resting[k].place.traded(print.size),
+                }
+            } else {
+                f64::INFINITY
+            };
+            if let Some(offer) = self.offer_at(limit, at).filter(|_| reached > 0.0) {
+                self.make(k, &offer, quantity_of(reached));
+            }
+        }
+        self.sweep(at);
+    }
+
+    /// The price that sets a stop of `side` off: of what it would take from.
+    fn stop_price(&self, side: Side) -> Option<Price> {
+        self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok())
+    }
+
+    /// What an order of `side` can take now.
+    fn offer_shown(&self, side: Side, at: Timestamp) -> Option<Offer> {
+        let reference = self.shown.reference(self.rules.reference, side)?;
+        let mid = self.shown.mid().unwrap_or(reference);
+        let book = self.shown.book(at);
+        let volume = book.displayed(side);
+        Some(Offer { at, reference, mid, book, volume, row: self.row(), band: self.band(mid) })
+    }
+
+    /// What a resting order is taken at.
+    fn offer_at(&self, limit: Price, at: Timestamp) -> Option<Offer> {
+        let mid = self.shown.mid().unwrap_or(limit.to_f64());
+        let book = self.shown.book(at);
+        Some(Offer {
+            at,
+            reference: limit.to_f64(),
+            mid,
+            book,
+            volume: f64::INFINITY,
+            row: self.row(),
+            band: self.band(mid),
+        })
+    }
+
+    /// Lowest and highest price displayed on the inside.
+    fn band(&self, mid: f64) -> [Price; 2] {
+        let mid = Price::nearest(mid).unwrap_or_default();
+        let of = |side| self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok()).unwrap_or(mid);
+        [of(Side::Sell).min(mid), of(Side::Buy).max(mid)]
+    }
+
+    fn row(&self) -> usize {
+        match self.shown {
+            Shown::Depth(_) => self.rows[3],
+            Shown::Last(_) => self.rows[2],
+            _ => self.rows[1],
+        }
+    }
+}
+
+/// Whether a price of others reaches the limit of an order of `side`.
+fn reaches(side: Side, price: Price, limit: Price) -> bool {
+    match side {
+        Side::Buy => price <= limit,
+        Side::Sell => price >= limit,
+    }
+}
+
+/// A size as a quantity, as large as can be where it is not known.
+fn quantity_of(size: f64) -> Quantity {
+    Quantity::nearest(size.min(9e9)).unwrap_or(Quantity::ZERO)
+}
+
+impl Resting {
+    /// Whether part of it still waits for its parent to fill.
+    pub fn waits_for_parent(&self) -> bool {
+        self.released < self.left
+    }
+}

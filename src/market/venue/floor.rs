@@ -1,0 +1,328 @@
+//! The floor on which one instrument is traded: the orders that wait there, and what fills them.
+
+use crate::market::{
+    Book, Condition, Execution, InFlight, Increments, Link, Met, OrderId, Price, Quantity, Reason, Reference, Role, Side,
+};
+use crate::sim2real::{Run, Tick, Timestamp};
+
+use super::by_order::Others;
+use super::resting::{Filled, Outcome, Resting, What};
+use super::shown::Shown;
+use super::{Intrabar, LimitFill, QueueModel};
+
+/// How a venue fills orders, as far as that is no mechanism.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::market) struct Rules {
+    pub reference: Reference,
+    pub intrabar: Intrabar,
+    pub limit_fill: LimitFill,
+    pub queue: QueueModel,
+    /// The first message's time is this of the run [ns]: laws count from it.
+    pub origin: Timestamp,
+}
+
+/// What a fill is made against.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Offer {
+    pub at: Timestamp,
+    /// Price before mechanisms [currency].
+    pub reference: f64,
+    pub mid: f64,
+    pub book: Book,
+    /// Volume the order may be a part of [units].
+    pub volume: f64,
+    pub row: usize,
+    pub band: [Price; 2],
+}
+
+/// The floor of one instrument.
+pub(in crate::market) struct Floor {
+    pub(super) number: usize,
+    pub(super) rules: Rules,
+    pub(super) run: Run<Execution>,
+    pub(super) increments: Increments,
+    /// Prices of fills move in these: ticks, unless a mechanism averages over several trades.
+    pub(super) fill_increments: Increments,
+    pub(super) resting: Vec<Resting>,
+    pub(super) shown: Shown,
+    /// What is held by what was filled here, whether or not anybody knows yet.
+    pub(super) held: Quantity,
+    /// What was taken of the volume of the bar or quote that is there now [units].
+    pub(super) taken: f64,
+    /// Number of the row that is there now: of bars, quotes, trades, changes of the book.
+    pub(super) rows: [usize; 4],
+    /// Bars within which the order of the extremes decided what was filled.
+    pub(super) ambiguous: usize,
+    /// Bars are there, and nothing finer.
+    pub(super) by_bars: bool,
+    /// The data know the orders of others one by one.
+    pub(super) by_order: bool,
+    pub(super) others: Others,
+    pub(super) messages: usize,
+    pub(super) outcomes: Vec<Outcome>,
+    /// What each mechanism that acts on prices added to the price of the last fill [currency].
+    pub(super) concessions: Vec<f64>,
+    /// The same of each fill among the outcomes, in their order.
+    pub(super) terms: Vec<f64>,
+}
+
+impl Floor {
+    pub(super) fn new(
+        number: usize,
+        increments: Increments,
+        averages: bool,
+        conceding: usize,
+        rules: Rules,
+        run: Run<Execution>,
+    ) -> Self {
+        Self {
+            number,
+            rules,
+            run,
+            increments,
+            fill_increments: if averages { increments.without_tick() } else { increments },
+            resting: Vec::new(),
+            shown: Shown::Nothing,
+            held: Quantity::ZERO,
+            taken: 0.0,
+            rows: [0; 4],
+            ambiguous: 0,
+            by_bars: false,
+            by_order: false,
+            others: Others::default(),
+            messages: 0,
+            outcomes: Vec::new(),
+            concessions: vec![0.0; conceding],
+            terms: Vec::new(),
+        }
+    }
+
+    /// The time of a message for the laws.
+    pub(super) fn tick(&mut self, time: Timestamp) -> Tick {
+        let index = self.messages;
+        self.messages += 1;
+        Tick { index, time: time.seconds_since(self.rules.origin), step: 0.0 }
+    }
+
+    /// Gives an order to the laws of commands, which say when it arrives and how large it may be.
+    pub fn shape(&mut self, order: &InFlight) -> InFlight {
+        let tick = self.tick(order.decided_at);
+        self.run.send(tick, order).first().copied().unwrap_or(*order)
+    }
+
+    /// What a position that is held is charged, from when it was charged last to `now` [currency].
+    pub fn charge(&mut self, held: &InFlight, mid: f64, now: Timestamp) -> f64 {
+        let tick = self.tick(now);
+        self.run.deliver(&[held.as_a(Role::Holder).arriving(now)]);
+        self.run.advance(tick, |_| Met { book: Book::at_price(now, mid), reference: mid, volume: f64::INFINITY });
+        self.run.observe(tick.time).first().map_or(0.0, |report| report.fee)
+    }
+
+    /// How much of order `k` may be filled now: a reduce-only order no more than closes what is held.
+    pub(super) fn allowed(&self, k: usize) -> Quantity {
+        let order = &self.resting[k];
+        let tradable = order.tradable();
+        if order.condition != Condition::ReduceOnly {
+            return tradable;
+        }
+        let closes = match order.side {
+            Side::Buy => (-self.held).max(Quantity::ZERO),
+            Side::Sell => self.held.max(Quantity::ZERO),
+        };
+        tradable.min(closes)
+    }
+
+    /// Order `k` takes from `offer`, at most `most`.
+    pub(super) fn take(&mut self, k: usize, offer: &Offer, most: Quantity) {
+        let order = &self.resting[k];
+        let (side, limit) = (order.side, order.limit());
+        let mut wanted = self.increments.whole_lots(self.allowed(k).min(most));
+        let cap = order.order.participation_limit;
+        if cap.is_finite() {
+            // Earlier orders took their part of the same volume.
+            let left = (cap * offer.volume - self.taken).max(0.0);
+            wanted = wanted.min(self.increments.whole_lots(Quantity::nearest(left.min(9e9)).unwrap_or(wanted)));
+        }
+        self.resting[k].met = true;
+        if wanted <= Quantity::ZERO {
+            return;
+        }
+        let arriving = InFlight { quantity: wanted.to_f64(), ..self.resting[k].order.as_a(Role::Taker) };
+        let (model_price, filled, quantity, fee) = self.meet(&arriving, offer);
+        // A quantity beyond 2^53 steps does not come back from a float as it went in: what is filled whole is whole.
+        let reported = Quantity::nearest(quantity).unwrap_or(wanted);
+        let quantity =
+            if filled >= 1.0 || reported >= wanted { wanted } else { self.increments.whole_lots(reported).min(wanted) };
+        if quantity <= Quantity::ZERO {
+            return;
+        }
+        self.taken += quantity.to_f64();
+        // An order with a limit pays no more than that, whatever mechanisms say.
+        let (mut price, mut model_price) = (self.rounded(side, model_price), model_price);
+        if let Some(limit) = limit.filter(|limit| !self.resting[k].accepts_price(price, *limit)) {
+            (price, model_price) = (limit, limit.to_f64());
+        }
+        self.fill(k, Role::Taker, quantity, price, model_price, fee, offer);
+    }
+
+    /// Order `k`, which rests, is taken by others: `quantity` of it at its limit.
+    pub(super) fn make(&mut self, k: usize, offer: &Offer, quantity: Quantity) {
+        let wanted = self.increments.whole_lots(self.allowed(k).min(quantity));
+        let Some(limit) = self.resting[k].limit().filter(|_| wanted > Quantity::ZERO) else { return };
+        let arriving = InFlight {
+            quantity: wanted.to_f64(),
+            participation_limit: f64::INFINITY,
+            ..self.resting[k].order.as_a(Role::Maker)
+        };
+        let offer = Offer { reference: limit.to_f64(), ..*offer };
+        let (_, _, _, fee) = self.meet(&arriving, &offer);
+        // It fills at its limit and nowhere else: what mechanisms hold against it is charged.
+        let charged: f64 = self.concessions.iter().sum::<f64>() * wanted.to_f64();
+        self.fill(k, Role::Maker, wanted, limit, limit.to_f64(), fee + charged, &offer);
+    }
+
+    /// Lets an order meet an offer: price, part filled, quantity and fee.
+    fn meet(&mut self, arriving: &InFlight, offer: &Offer) -> (f64, f64, f64, f64) {
+        let tick = self.tick(offer.at);
+        let met = Met { book: offer.book, reference: offer.reference, volume: offer.volume };
+        self.run.deliver(&[*arriving]);
+        let (concessions, mut before) = (&mut self.concessions, 0.0);
+        self.run.advance_seen(
+            tick,
+            |_| met,
+            |law, effects| {
+                let after = effects.first().map_or(0.0, |effect| effect.concession);
+                if let Some(own) = concessions.get_mut(law) {
+                    *own = after - before;
+                }
+                before = after;
+            },
+        );
+        let report = self.run.observe(tick.time).first().copied().unwrap_or_default();
+        (report.price, report.filled, report.quantity, report.fee)
+    }
+
+    /// A price on a tick; 0 where there is none that could be.
+    fn rounded(&self, side: Side, price: f64) -> Price {
+        Price::nearest(price).map_or(Price(0), |price| self.fill_increments.against(side, price))
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "they are the parts of one fill")]
+    fn fill(&mut self, k: usize, role: Role, quantity: Quantity, price: Price, model_price: f64, fee: f64, offer: &Offer) {
+        let order = &mut self.resting[k];
+        order.left = order.left - quantity;
+        order.released = order.released - quantity;
+        let (id, side, link, whole) = (order.id, order.side, order.link, order.left <= Quantity::ZERO);
+        let queued_behind = if role == Role::Maker { order.place.joined_behind } else { 0.0 };
+        self.held = self.held + quantity.signed(side);
+        let filled = Filled {
+            role,
+            quantity,
+            price,
+            model_price,
+            mid: offer.mid,
+            fee,
+            whole,
+            queued_behind,
+            row: offer.row,
+            band: offer.band,
+        };
+        self.terms.extend_from_slice(&self.concessions);
+        self.tell(id, offer.at, What::Filled(filled));
+        self.settle_links(id, link, quantity, offer.at);
+    }
+
+    pub(super) fn tell(&mut self, id: OrderId, at: Timestamp, what: What) {
+        self.outcomes.push(Outcome { id, instrument: self.number, at, what });
+    }
+
+    /// What the fill of one order does to those it is linked with.
+    fn settle_links(&mut self, id: OrderId, link: Link, quantity: Quantity, at: Timestamp) {
+        let mut over = Vec::new();
+        for order in self.resting.iter_mut().filter(|order| order.id != id) {
+            if order.link == (Link::ChildOf { parent: id }) {
+                // Children work for as much as their parent has filled.
+                order.released = (order.released + quantity).min(order.left);
+            } else if link != Link::Alone && order.link == link {
+                order.left = order.left - quantity;
+                order.released = (order.released - quantity).min(order.left).max(Quantity::ZERO);
+                if order.left <= Quantity::ZERO {
+                    over.push(order.id);
+                }
+            }
+        }
+        for id in over {
+            self.tell(id, at, What::Ended(Reason::Linked));
+        }
+    }
+
+    /// Takes order `k` off the floor for `reason`, and its children, which then wait for nothing.
+    pub(super) fn end(&mut self, k: usize, at: Timestamp, reason: Reason) {
+        let order = self.resting[k];
+        self.resting[k].left = Quantity::ZERO;
+        self.tell(order.id, at, What::Ended(reason));
+    }
+
+    /// Clears away the orders that are over, and what children wait for that their parents never fill.
+    pub(super) fn sweep(&mut self, at: Timestamp) {
+        let alive: Vec<OrderId> = self.resting.iter().filter(|o| o.left > Quantity::ZERO).map(|o| o.id).collect();
+        for k in 0..self.resting.len() {
+            let order = &mut self.resting[k];
+            if let Link::ChildOf { parent } = order.link
+                && order.left > Quantity::ZERO
+                && !alive.contains(&parent)
+            {
+                order.left = order.left.min(order.released);
+                if order.left <= Quantity::ZERO {
+                    self.end(k, at, Reason::Linked);
+                }
+            }
+        }
+        self.resting.retain(|order| order.left > Quantity::ZERO);
+    }
+
+    /// Takes an order back as its owner asked, if it is still there.
+    pub fn cancel(&mut self, id: OrderId, at: Timestamp, reason: Reason) -> bool {
+        let Some(k) = self.resting.iter().position(|order| order.id == id) else { return false };
+        self.end(k, at, reason);
+        self.sweep(at);
+        true
+    }
+
+    /// Changes an order as its owner asked, if it is still there: it goes to the end of the queue unless only its quantity
+    /// shrinks.
+    pub fn replace(&mut self, id: OrderId, quantity: Option<Quantity>, price: Option<Price>, at: Timestamp) -> bool {
+        let Some(k) = self.resting.iter().position(|order| order.id == id) else { return false };
+        let order = &mut self.resting[k];
+        let filled = Quantity::nearest(order.order.quantity).map_or(Quantity::ZERO, |whole| whole - order.left);
+        let left = quantity.map_or(order.left, |whole| (whole - filled).max(Quantity::ZERO));
+        let grows = left > order.left;
+        let waits_for_parent = order.released < order.left;
+        order.order.quantity = (left + filled).to_f64();
+        order.left = left;
+        order.released = if waits_for_parent { order.released.min(left) } else { left };
+        if let Some(price) = price {
+            order.kind = order.kind.at(price);
+        }
+        let (whole, kind) = (left + filled, order.kind);
+        self.tell(id, at, What::Replaced { quantity: whole, kind });
+        if left <= Quantity::ZERO {
+            self.end(k, at, Reason::Asked);
+        } else if (grows || price.is_some()) && !self.by_bars {
+            self.resting[k].place = super::queue::Place::default();
+            self.join(k, at);
+        }
+        self.sweep(at);
+        true
+    }
+}
+
+impl Resting {
+    /// Whether `price` is no worse than `limit`.
+    fn accepts_price(&self, price: Price, limit: Price) -> bool {
+        match self.side {
+            Side::Buy => price <= limit,
+            Side::Sell => price >= limit,
+        }
+    }
+}
