@@ -42,16 +42,45 @@ impl Floor {
             // A market order takes whatever its size, as diagnosis has it; a limit order what is displayed within its limit.
             let within = match order.kind {
                 OrderKind::Market => Quantity(i64::MAX),
-                _ => quantity_of(self.shown.takable(order.side, order.limit())),
+                _ => quantity_of(self.takable(&order)),
             };
             let whole = within >= order.tradable();
             if (whole || order.time_in_force != TimeInForce::FillOrKill)
                 && let Some(offer) = self.offer_shown(order.side, at)
             {
                 self.take(k, &offer, within);
+                self.remember_taken(order.side);
             }
         }
         self.wait_or_end(k, at);
+    }
+
+    /// What an order finds within its limit [units]. What was taken of it already is not there a second time, though a
+    /// replayed market goes on to show it.
+    fn takable(&self, order: &Resting) -> f64 {
+        let own = self.taken_from.is_some_and(|(side, ..)| side == order.side);
+        (self.shown.takable(order.side, order.limit()) - if own { self.taken } else { 0.0 }).max(0.0)
+    }
+
+    /// Remembers from which best price it was taken, and what was displayed there.
+    fn remember_taken(&mut self, side: Side) {
+        self.taken_from = self.best_taken(side).filter(|_| self.taken > 0.0).map(|(price, size)| (side, price, size));
+    }
+
+    /// Best price an order of `side` can take, and what is displayed there.
+    fn best_taken(&self, side: Side) -> Option<(Price, f64)> {
+        let touch = Price::nearest(self.shown.touch(side)?).ok()?;
+        Some((touch, self.shown.displayed_at(side.opposite(), touch)))
+    }
+
+    /// What was taken is there again where the best price is another, or more is displayed there.
+    fn refresh_taken(&mut self) {
+        let still = self.taken_from.is_some_and(|(side, price, size)| {
+            self.best_taken(side).is_some_and(|(now, displayed)| now == price && displayed <= size)
+        });
+        if !still {
+            (self.taken, self.taken_from) = (0.0, None);
+        }
     }
 
     /// What is left of an order that has met the market: it waits, or is over.
@@ -87,7 +116,7 @@ impl Floor {
             return;
         }
         let book = quote.book();
-        if self.resting.is_empty() {
+        if self.resting.is_empty() && self.taken == 0.0 {
             self.shown = Shown::Quote(book);
             return;
         }
@@ -135,7 +164,9 @@ impl Floor {
         if let Shown::Depth(book) = &mut self.shown {
             book.settle();
         }
-        self.taken = 0.0;
+        if self.taken > 0.0 {
+            self.refresh_taken();
+        }
         if self.resting.is_empty() {
             return;
         }
@@ -158,6 +189,10 @@ impl Floor {
                 else {
                     return;
                 };
+                // What we took ourselves is shown on; nobody new is there.
+                if self.taken > 0.0 && self.takable(&order) <= 0.0 {
+                    return;
+                }
                 // Whoever shows a price at or beyond our limit has passed us by: we stood before them.
                 self.make(k, &offer, order.tradable());
             }
@@ -178,7 +213,7 @@ impl Floor {
         let Ok(price) = Price::nearest(print.price) else { return };
         if matches!(self.shown, Shown::Nothing | Shown::Last(_)) {
             self.shown = Shown::Last(price);
-            self.taken = 0.0;
+            (self.taken, self.taken_from) = (0.0, None);
         }
         if self.resting.is_empty() {
             return;

@@ -49,6 +49,8 @@ pub(in crate::market) struct Floor {
     pub(super) held: Quantity,
     /// What was taken of the volume of the bar or quote that is there now [units].
     pub(super) taken: f64,
+    /// From which side, best price and size it was taken, where prices are displayed.
+    pub(super) taken_from: Option<(Side, Price, f64)>,
     /// Number of the row that is there now: of bars, quotes, trades, changes of the book.
     pub(super) rows: [usize; 4],
     /// Bars within which the order of the extremes decided what was filled.
@@ -85,6 +87,7 @@ impl Floor {
             shown: Shown::Nothing,
             held: Quantity::ZERO,
             taken: 0.0,
+            taken_from: None,
             rows: [0; 4],
             ambiguous: 0,
             by_bars: false,

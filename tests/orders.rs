@@ -1,0 +1,245 @@
+//! Orders of every kind: when they trade, at which prices, and what ends them.
+
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
+
+mod market_scene;
+
+use market_scene::{MINUTE, bar, bars, event, fills, limit, of, quantity, quotes, run, run_with, settings, status, stop};
+use trueup::market::{
+    Condition, Intrabar, LimitFill, Matching, OrderKind, Price, Reason, Role, Settings, Side, Status, Ticket, TimeInForce,
+};
+use trueup::sim2real::Timestamp;
+
+fn at(price: f64) -> Price {
+    Price::nearest(price).unwrap()
+}
+
+fn matching(intrabar: Intrabar, limit_fill: LimitFill) -> Settings {
+    Settings { matching: Matching { intrabar, limit_fill, ..Matching::default() }, ..settings() }
+}
+
+// Bars: open, high, low, close.
+
+#[test]
+fn a_limit_order_is_filled_a_tick_beyond_its_limit_and_at_its_limit() {
+    let history = || of(&[[10.0, 10.0, 10.0, 10.0], [10.0, 10.5, 9.5, 10.0], [10.0, 10.2, 9.49, 10.1]]);
+    let buy = || event(0).submit(limit(Side::Buy, 5.0, 9.5));
+    // The second bar touches 9.50; the third goes through.
+    let through = run(history(), &[], buy());
+    assert_eq!(fills(&through), [(3 * MINUTE, 5.0, 9.5)]);
+    assert_eq!(through.blotter.fills[0].why.role, Role::Maker);
+    let touched = run_with(vec![history()], &[], matching(Intrabar::default(), LimitFill::Touch), buy());
+    assert_eq!(fills(&touched), [(2 * MINUTE, 5.0, 9.5)]);
+}
+
+#[test]
+fn a_limit_order_beyond_the_open_takes_the_open() {
+    let history = of(&[[10.0, 10.0, 10.0, 10.0], [9.8, 10.5, 9.5, 10.0]]);
+    let record = run(history, &[], event(0).submit(limit(Side::Buy, 5.0, 9.9)));
+    assert_eq!(fills(&record), [(MINUTE, 5.0, 9.8)]);
+    assert_eq!(record.blotter.fills[0].why.role, Role::Taker);
+}
+
+#[test]
+fn a_mechanism_never_makes_a_limit_order_pay_more_than_its_limit() {
+    let history = of(&[[10.0, 10.0, 10.0, 10.0], [9.89, 10.5, 9.5, 10.0]]);
+    let record = run(history, &[("half_spread", "bps", 100.0)], event(0).submit(limit(Side::Buy, 5.0, 9.9)));
+    assert_eq!(fills(&record), [(MINUTE, 5.0, 9.9)]);
+}
+
+#[test]
+fn a_stop_is_set_off_within_the_bar_and_at_the_open_where_the_market_has_gone_past_it() {
+    let history = || of(&[[10.0, 10.0, 10.0, 10.0], [10.0, 10.5, 9.5, 10.0], [11.0, 11.0, 11.0, 11.0]]);
+    let within = run(history(), &[], event(0).submit(stop(Side::Buy, 5.0, 10.3)));
+    assert_eq!(fills(&within), [(2 * MINUTE, 5.0, 10.3)]);
+    let gap = run(history(), &[], event(0).submit(stop(Side::Buy, 5.0, 10.9)));
+    assert_eq!(fills(&gap), [(2 * MINUTE, 5.0, 11.0)], "at the open beyond it, not at the trigger");
+    let never = run(history(), &[], event(0).submit(stop(Side::Sell, 5.0, 9.4)));
+    assert_eq!((fills(&never), status(&never)), (vec![], vec![Status::Unfilled]));
+}
+
+#[test]
+fn a_stop_limit_becomes_a_limit_order_when_it_is_set_off() {
+    let kind = OrderKind::StopLimit { trigger: at(10.3), price: at(10.4) };
+    let buy = || event(0).submit(Ticket::new(0, Side::Buy, quantity(5.0), kind));
+    let within = of(&[[10.0, 10.0, 10.0, 10.0], [10.0, 10.5, 9.5, 10.0]]);
+    assert_eq!(fills(&run(within, &[], buy())), [(2 * MINUTE, 5.0, 10.3)]);
+    // Beyond its limit at once: it waits until the market comes back through the limit.
+    let gap = of(&[[10.0, 10.0, 10.0, 10.0], [11.0, 11.0, 10.9, 11.0], [10.8, 10.8, 10.2, 10.3]]);
+    assert_eq!(fills(&run(gap, &[], buy())), [(3 * MINUTE, 5.0, 10.4)]);
+}
+
+#[test]
+fn a_trailing_stop_follows_the_market_and_stays_while_it_comes_back() {
+    let history = of(&[
+        [10.0, 10.0, 10.0, 10.0],
+        [10.0, 11.0, 10.0, 11.0],
+        [11.0, 12.0, 11.0, 12.0],
+        [12.0, 12.0, 11.6, 11.8],
+        [11.8, 11.8, 11.0, 11.0],
+    ]);
+    let sell = Ticket::new(0, Side::Sell, quantity(5.0), OrderKind::TrailingStop { distance: at(0.5) });
+    let record = run(history, &[], event(0).submit(sell));
+    assert_eq!(fills(&record), [(5 * MINUTE, 5.0, 11.5)], "half a unit below the best of 12.00");
+}
+
+#[test]
+fn a_bracket_leaves_by_one_exit_and_cancels_the_other() {
+    let entry = || Ticket::market(0, Side::Buy, quantity(10.0));
+    let up = of(&[[10.0, 10.0, 10.0, 10.0], [10.0, 10.4, 9.9, 10.2], [10.2, 11.1, 10.2, 11.0], [11.0, 11.0, 8.0, 8.0]]);
+    let record = run(up, &[], event(0).bracket(entry(), at(11.0), at(9.5)));
+    assert_eq!(fills(&record), [(MINUTE, 10.0, 10.0), (3 * MINUTE, 10.0, 11.0)]);
+    assert_eq!(status(&record), [Status::Filled, Status::Filled, Status::Cancelled]);
+    assert_eq!(record.blotter.orders[2].reason, Some(Reason::Linked));
+    assert!(record.ledger.is_flat());
+    let down = of(&[[10.0, 10.0, 10.0, 10.0], [10.0, 10.4, 9.9, 10.2], [10.2, 10.2, 9.2, 9.3], [9.3, 12.0, 9.3, 12.0]]);
+    let record = run(down, &[], event(0).bracket(entry(), at(11.0), at(9.5)));
+    assert_eq!(fills(&record), [(MINUTE, 10.0, 10.0), (3 * MINUTE, 10.0, 9.5)]);
+}
+
+/// Stop and target in one bar: which is filled is the rule's, and counted.
+#[test]
+fn stop_and_target_in_one_bar_are_resolved_by_the_stated_rule_and_counted() {
+    let outcome = |rule| {
+        let both = of(&[[10.0, 10.0, 10.0, 10.0], [10.0, 10.1, 9.9, 10.0], [10.0, 11.5, 9.0, 10.0], [10.0; 4]]);
+        let entry = Ticket::market(0, Side::Buy, quantity(1.0));
+        let plan = event(0).bracket(entry, at(11.0), at(9.5));
+        let record = run_with(vec![both], &[], matching(rule, LimitFill::Through), plan);
+        (fills(&record)[1].2, record.held.ambiguous_bars)
+    };
+    assert_eq!(outcome(Intrabar::Pessimistic), (9.5, 1));
+    assert_eq!(outcome(Intrabar::Optimistic), (11.0, 1));
+    assert_eq!(outcome(Intrabar::LowFirst), (9.5, 1));
+    assert_eq!(outcome(Intrabar::HighFirst), (11.0, 1));
+    assert_eq!(outcome(Intrabar::NearestFirst), (9.5, 1), "the low is 1.0 away, the high 1.5");
+}
+
+#[test]
+fn exits_work_for_as_much_as_the_entry_has_filled() {
+    // A tenth of 100 a bar: the entry takes three bars for 30.
+    let all = (0..8).map(|k| bar(k, 10.0, 10.0, 100.0)).chain([bar(8, 11.5, 11.5, 1e6)]).collect();
+    let history = trueup::market::History::new(all, Default::default()).unwrap();
+    let plan = event(0).bracket(limit(Side::Buy, 30.0, 10.0), at(11.0), at(9.0));
+    let record = run(history, &[("participation_cap", "", 0.1)], plan);
+    let quantities: Vec<f64> = fills(&record).iter().map(|fill| fill.1).collect();
+    assert_eq!(quantities, [10.0, 10.0, 10.0, 30.0]);
+    assert!(record.ledger.is_flat());
+}
+
+#[test]
+fn orders_for_the_open_and_the_close_trade_there_and_nowhere_else() {
+    // Two days of three bars.
+    let day = 1_440;
+    let all = [0, 1, 2, day, day + 1, day + 2]
+        .iter()
+        .enumerate()
+        .map(|(k, m)| bar(*m, 10.0 + k as f64, 10.5 + k as f64, 1e3))
+        .collect();
+    let history = trueup::market::History::new(all, Default::default()).unwrap();
+    let order = |kind| Ticket::new(0, Side::Buy, quantity(1.0), kind);
+    let plan = event(0)
+        .submit(order(OrderKind::MarketOnOpen))
+        .submit(order(OrderKind::MarketOnClose))
+        .submit(order(OrderKind::LimitOnClose { price: at(12.0) }))
+        .submit(order(OrderKind::LimitOnOpen { price: at(13.0) }));
+    let record = run(history, &[], plan);
+    assert_eq!(fills(&record), [(3 * MINUTE, 1.0, 12.5), (day * MINUTE, 1.0, 13.0), (day * MINUTE, 1.0, 13.0)]);
+    assert_eq!(record.blotter.orders[2].status, Status::Expired, "the close of 12.5 is beyond its limit");
+}
+
+#[test]
+fn the_time_in_force_ends_what_is_left() {
+    let cases = [
+        (TimeInForce::ImmediateOrCancel, Status::Expired),
+        (TimeInForce::FillOrKill, Status::Rejected),
+        (TimeInForce::Day, Status::Expired),
+        (TimeInForce::GoodTillDate(Timestamp(3 * MINUTE)), Status::Expired),
+        (TimeInForce::GoodTillCancelled, Status::Filled),
+    ];
+    for (time_in_force, expected) in cases {
+        // Below the limit only on the second day.
+        let all =
+            [0, 1, 2, 3, 1_440, 1_441].iter().map(|m| bar(*m, if *m < 1_440 { 10.0 } else { 8.0 }, 10.0, 1e3)).collect();
+        let history = trueup::market::History::new(all, Default::default()).unwrap();
+        let record = run(history, &[], event(0).submit(limit(Side::Buy, 1.0, 9.0).working(time_in_force)));
+        assert_eq!(status(&record), [expected], "{time_in_force:?}");
+    }
+}
+
+#[test]
+fn conditions_are_kept() {
+    let flat = || of(&[[10.0; 4], [10.0, 10.5, 9.5, 10.0], [10.0; 4], [10.0; 4]]);
+    let post = run(flat(), &[], event(0).submit(limit(Side::Buy, 1.0, 10.2).on(Condition::PostOnly)));
+    assert_eq!((status(&post), post.blotter.orders[0].reason), (vec![Status::Rejected], Some(Reason::PostOnly)));
+    let reduce = run(
+        flat(),
+        &[],
+        event(0)
+            .submit(Ticket::market(0, Side::Buy, quantity(3.0)))
+            .at(1)
+            .submit(Ticket::market(0, Side::Sell, quantity(5.0)).on(Condition::ReduceOnly)),
+    );
+    assert_eq!(fills(&reduce), [(MINUTE, 3.0, 10.0), (2 * MINUTE, 3.0, 10.0)]);
+    assert!(reduce.ledger.is_flat());
+}
+
+#[test]
+fn an_order_is_cancelled_and_changed_on_request() {
+    let history = || of(&[[10.0; 4], [10.0, 10.0, 9.8, 10.0], [10.0, 10.0, 9.0, 9.0], [9.0; 4]]);
+    let cancelled = run(history(), &[], event(0).submit(limit(Side::Buy, 1.0, 9.5)).at(1).cancel(1));
+    assert_eq!((status(&cancelled), cancelled.blotter.orders[0].reason), (vec![Status::Cancelled], Some(Reason::Asked)));
+    let changed = run(history(), &[], event(0).submit(limit(Side::Buy, 1.0, 9.5)).at(1).replace(1, Some(4.0), Some(9.2)));
+    assert_eq!(fills(&changed), [(3 * MINUTE, 4.0, 9.2)]);
+    let unknown = run(history(), &[], event(0).cancel(77));
+    assert_eq!(unknown.blotter.rejected[&Reason::UnknownOrder], 1);
+}
+
+#[test]
+fn one_cancels_the_other() {
+    let history = of(&[[10.0; 4], [10.0, 10.0, 9.0, 10.0], [10.0, 12.0, 10.0, 12.0]]);
+    let plan = event(0).group(vec![limit(Side::Buy, 2.0, 9.5), stop(Side::Buy, 2.0, 11.0)]);
+    let record = run(history, &[], plan);
+    assert_eq!(fills(&record), [(2 * MINUTE, 2.0, 9.5)]);
+    assert_eq!(status(&record), [Status::Filled, Status::Cancelled]);
+}
+
+#[test]
+fn prices_off_the_tick_and_orders_without_their_like_are_refused() {
+    let plan = event(0)
+        .submit(limit(Side::Buy, 1.0, 9.505))
+        .submit(limit(Side::Buy, 1.0, -1.0))
+        .submit(limit(Side::Buy, 1.0, 9.0).working(TimeInForce::GoodTillDate(Timestamp(5))))
+        .submit(limit(Side::Buy, 1.0, 9.0).linked(trueup::market::Link::ChildOf { parent: trueup::market::OrderId(99) }));
+    let record = run(bars(&[(10.0, 10.0), (10.0, 10.0)]), &[], plan);
+    let reasons: Vec<Reason> = record.blotter.rejections.iter().map(|r| r.reason).collect();
+    assert_eq!(reasons, [Reason::OffTick, Reason::OffTick, Reason::Late, Reason::Unlinked]);
+}
+
+// Quotes: time, bid, ask; 100 displayed on each side.
+
+#[test]
+fn a_resting_order_is_filled_when_others_show_its_price() {
+    let rows = [(0, 99.0, 101.0), (1, 99.0, 101.0), (2, 98.0, 100.0), (3, 97.0, 99.0)];
+    let record = run(quotes(&rows), &[], event(0).submit(limit(Side::Buy, 7.0, 99.0)));
+    assert_eq!(fills(&record), [(3, 7.0, 99.0)]);
+    assert_eq!(record.blotter.fills[0].why.queued_behind, 100.0);
+}
+
+#[test]
+fn a_limit_order_takes_what_is_displayed_within_it_and_rests_with_the_rest() {
+    let rows = [(0, 99.0, 101.0), (1, 99.0, 101.0), (2, 99.0, 102.0), (3, 99.0, 100.0)];
+    let record = run(quotes(&rows), &[], event(0).submit(limit(Side::Buy, 150.0, 101.0)));
+    assert_eq!(fills(&record), [(0, 100.0, 101.0), (3, 50.0, 101.0)]);
+    let killed = limit(Side::Buy, 150.0, 101.0).working(TimeInForce::FillOrKill);
+    assert_eq!(status(&run(quotes(&rows), &[], event(0).submit(killed))), [Status::Rejected]);
+    let at_once = limit(Side::Buy, 150.0, 101.0).working(TimeInForce::ImmediateOrCancel);
+    let record = run(quotes(&rows), &[], event(0).submit(at_once));
+    assert_eq!((fills(&record), status(&record)), (vec![(0, 100.0, 101.0)], vec![Status::Expired]));
+}
+
+#[test]
+fn a_stop_is_set_off_by_the_price_it_would_take() {
+    let rows = [(0, 99.0, 101.0), (1, 100.0, 102.0), (2, 101.0, 103.0), (3, 102.0, 104.0)];
+    let record = run(quotes(&rows), &[], event(0).submit(stop(Side::Buy, 1.0, 103.0)));
+    assert_eq!(fills(&record), [(2, 1.0, 103.0)]);
+}
