@@ -166,6 +166,15 @@ impl Blotter {
         }
     }
 
+    /// The order of that id, found in the order of ids, or wherever else it stands.
+    #[must_use]
+    pub fn order(&self, order_id: u64) -> Option<&Order> {
+        match self.orders.binary_search_by_key(&order_id, |order| order.order_id) {
+            Ok(at) => self.orders.get(at),
+            Err(_) => self.orders.iter().find(|order| order.order_id == order_id),
+        }
+    }
+
     /// Number of orders sent that came as far as `status`.
     #[must_use]
     pub fn count(&self, status: Status) -> usize {

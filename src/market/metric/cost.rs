@@ -41,7 +41,7 @@ impl Costs {
             costs.spread_and_impact += fill.cost.spread_and_impact;
             costs.rounding += fill.cost.rounding;
             costs.fees += fill.fee.to_f64();
-            if let Some(order) = blotter.orders.get(fill.order_id as usize - 1) {
+            if let Some(order) = blotter.order(fill.order_id) {
                 costs.decided_value += (order.decision_price * fill.quantity).to_f64();
             }
         }
