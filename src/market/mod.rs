@@ -29,6 +29,8 @@ mod quote;
 #[cfg(feature = "io")]
 mod run;
 #[cfg(feature = "io")]
+mod run_figures;
+#[cfg(feature = "io")]
 mod run_log;
 #[cfg(feature = "io")]
 mod run_needs;

@@ -72,6 +72,15 @@ impl RoundTrip {
         trips.iter().filter_map(|trip| positions.get(trip.instrument).map(|p| trip.closed(p, end))).collect()
     }
 
+    /// `long` or `short`.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self.side {
+            Side::Buy => "long",
+            Side::Sell => "short",
+        }
+    }
+
     /// Gain after fees over what was entered (a fraction).
     #[must_use]
     pub fn growth(&self) -> Option<f64> {
