@@ -151,7 +151,10 @@ impl Told<'_> {
 
     fn of_risk(&self) -> Vec<Metric> {
         let (m, returns) = (self.metrics(), &self.metrics().returns);
-        let falls = format!("From a high to its recovery, or to the end; of {} the deepest have their dates above.", Drawdowns::KEPT);
+        let falls = format!(
+            "From a high to its recovery, or to the end; of {} the deepest have their dates above.",
+            Drawdowns::KEPT
+        );
         vec![
             self.volatility(),
             self.max_drawdown(),

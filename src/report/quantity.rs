@@ -205,7 +205,10 @@ mod tests {
     #[test]
     fn time_is_told_in_its_unit() {
         let spans = [0.5, 90.0, 150.0, 5_400.0, 7_200.0, 108_000.0, 864_000.0].map(span);
-        assert_eq!(spans.map(|s| s.replace('\u{a0}', " ")), ["0.5 s", "90 s", "2.5 min", "90 min", "2 h", "30 h", "10 days"]);
+        assert_eq!(
+            spans.map(|s| s.replace('\u{a0}', " ")),
+            ["0.5 s", "90 s", "2.5 min", "90 min", "2 h", "30 h", "10 days"]
+        );
         assert_eq!((fine(0.012_34), fine(f64::NAN).as_str()), ("1.23\u{a0}%".into(), UNDEFINED));
     }
 

@@ -157,14 +157,15 @@ impl Trip {
             Side::Sell => self.entry_value.minus(worth)?,
         };
         let exited_at = (held == 0).then_some(self.last_at);
-        let average = |value: Cash, quantity: i128| value.to_f64() / (quantity as f64 * 1e-9);
+        // Units of cash over units of quantity are units of price.
+        let average = |value: Cash, quantity: i128| value.0 as f64 / quantity as f64 / 1e9;
         Ok(RoundTrip {
             instrument: self.instrument,
             side: self.side,
             entered_at: self.entered_at,
             exited_at,
             seconds: exited_at.or(end).unwrap_or(self.last_at).seconds_since(self.entered_at).max(0.0),
-            quantity: self.entered as f64 * 1e-9,
+            quantity: self.entered as f64 / 1e9,
             entry_price: average(self.entry_value, self.entered),
             exit_price: (self.exited > 0).then(|| average(self.exit_value, self.exited)),
             entry_value: self.entry_value,

@@ -20,12 +20,8 @@ impl Section for Metrics<'_> {
     }
 
     fn render(&self) -> Result<String, ReportError> {
-        let metrics: Vec<Value> = self
-            .page
-            .metrics
-            .iter()
-            .map(|m| context! { name => &m.name, value => shown(m), help => &m.help })
-            .collect();
+        let metrics: Vec<Value> =
+            self.page.metrics.iter().map(|m| context! { name => &m.name, value => shown(m), help => &m.help }).collect();
         if metrics.is_empty() {
             return Ok(String::new());
         }
