@@ -308,7 +308,7 @@ fn a_backtest_leaves_a_log_that_can_be_diagnosed() {
     let ran = scene.run("backtest run.toml --out ran");
     assert_eq!((ran.code, ran.err.as_str()), (0, ""));
     assert!(ran.out.starts_with("sma_cross on XYZ, 5 August 2024 to 30 August 2024: "), "{}", ran.out);
-    let written = ["equity.parquet", "fills.parquet", "orders.parquet", "report.html", "run.json"];
+    let written = ["equity.parquet", "fills.parquet", "orders.parquet", "report.html", "run.json", "trades.parquet"];
     assert_eq!(names(&scene.path("ran")), written);
     let summary: Value = serde_json::from_str(&scene.read("ran/run.json")).unwrap();
     assert_eq!(summary["schema"], "trueup.run/1");

@@ -81,7 +81,7 @@ fn sma_cross_on_spy_adds_up() {
     let blotter = &record.blotter;
     assert!(blotter.fills.len() > 50 && blotter.rejected.is_empty(), "{} fills", blotter.fills.len());
     for fill in &blotter.fills {
-        let order = &blotter.orders[fill.order_id as usize - 1];
+        let order = blotter.order(fill.order_id).unwrap();
         assert!(fill.filled_at >= order.decided_at, "order {} was filled before it was decided", order.order_id);
         // It meets the first bar that opens once it is decided: at its open and a basis point, and not more than a tick.
         let met = bars.iter().find(|bar| bar.open_at >= order.decided_at).unwrap();

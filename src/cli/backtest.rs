@@ -24,7 +24,7 @@ Examples:
 pub(super) struct Run {
     /// TOML file of the run: cash, instruments, data, strategy, and what stands between decision and fill
     run: PathBuf,
-    /// Folder to write run.json, orders.parquet, fills.parquet, equity.parquet and report.html into
+    /// Folder to write run.json, orders.parquet, fills.parquet, trades.parquet, equity.parquet and report.html into
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write over files that exist

@@ -36,6 +36,8 @@ mod reason;
 #[cfg(feature = "io")]
 mod run;
 #[cfg(feature = "io")]
+mod run_figures;
+#[cfg(feature = "io")]
 mod run_log;
 #[cfg(feature = "io")]
 mod run_needs;

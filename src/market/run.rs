@@ -1,5 +1,7 @@
 //! Runs: what a RUN.toml sets up, and what it leaves.
 
+use chrono_tz::Tz;
+
 use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash, listed_mechanism};
 use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 
@@ -55,6 +57,7 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
         strategy: run.strategy.clone(),
         mechanisms: venue.modelled().into_iter().map(str::to_owned).collect(),
         reference: settings.reference.unwrap_or_else(|| Reference::suiting(&venue)),
+        zone: zone(run),
         inputs,
     };
     let backtest = Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))?;
@@ -69,6 +72,13 @@ impl PreparedRun {
     pub fn outputs(&self, record: &Record) -> Result<RunOutputs, MoneyError> {
         RunOutputs::new(self.provenance.clone(), &self.backtest, record)
     }
+}
+
+/// The zone of the data's times, where they have one in common.
+fn zone(run: &RunFile) -> Tz {
+    let mut zones = run.data.iter().map(|entry| entry.format.time.zone);
+    let first = zones.next().unwrap_or(Tz::UTC);
+    if zones.all(|zone| zone == first) { first } else { Tz::UTC }
 }
 
 fn own_document(run: &RunFile) -> Result<InputFile, InputError> {

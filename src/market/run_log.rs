@@ -1,11 +1,12 @@
 //! What a backtest leaves on disk: its summary, and its orders, fills and equity in the form of an execution log.
 
-use serde::Serialize;
+use chrono_tz::Tz;
+use serde::{Serialize, Serializer};
 
 use crate::io::{InputError, OutputFolder, OutputTable};
 use crate::report::{BacktestPage, ReportError};
 
-use super::metric::{Counts, InstrumentSummary, Metrics};
+use super::metric::{Counts, InstrumentSummary, Metrics, RoundTrip};
 use super::run_page::run_page;
 use super::{Backtest, Instrument, MoneyError, Record, Reference};
 
@@ -35,8 +36,15 @@ pub struct Provenance {
     pub mechanisms: Vec<String>,
     /// The price mechanisms start from where there are quotes; with bars only it is the open.
     pub reference: Reference,
+    /// The zone months are counted in: that of the data's times, UTC where they differ.
+    #[serde(serialize_with = "zone_name")]
+    pub zone: Tz,
     /// Every file it read.
     pub inputs: Vec<InputFile>,
+}
+
+fn zone_name<S: Serializer>(zone: &Tz, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(zone.name())
 }
 
 /// `run.json`.
@@ -83,6 +91,8 @@ pub struct RunOutputs {
     pub orders: OutputTable,
     /// `fills.parquet`.
     pub fills: OutputTable,
+    /// `trades.parquet`.
+    pub trades: OutputTable,
     /// `equity.parquet`.
     pub equity: OutputTable,
     /// `report.html`.
@@ -105,7 +115,8 @@ pub enum OutputError {
 
 impl RunOutputs {
     /// The files there will be.
-    pub const FILES: [&str; 5] = ["run.json", "orders.parquet", "fills.parquet", "equity.parquet", "report.html"];
+    pub const FILES: [&str; 6] =
+        ["run.json", "orders.parquet", "fills.parquet", "trades.parquet", "equity.parquet", "report.html"];
 
     /// What `record`, the record of `backtest`, is shown as.
     ///
@@ -113,11 +124,13 @@ impl RunOutputs {
     /// If an amount of cash is beyond what can be held.
     pub fn new(provenance: Provenance, backtest: &Backtest, record: &Record) -> Result<Self, MoneyError> {
         let summary = RunSummary::new(provenance, record, backtest.instruments())?;
+        let trips = RoundTrip::of(record)?;
         Ok(Self {
             orders: record.orders_table(backtest.instruments(), &summary.provenance.strategy),
             fills: record.fills_table(),
+            trades: trades_table(&trips, backtest.instruments()),
             equity: record.equity_table(),
-            page: run_page(&summary, backtest, record),
+            page: run_page(&summary, backtest, record, &trips),
             summary,
         })
     }
@@ -135,14 +148,37 @@ impl RunOutputs {
     /// # Errors
     /// As [`OutputFolder::file`], and a page or summary that cannot be made.
     pub fn write(&self, folder: &mut OutputFolder) -> Result<(), OutputError> {
-        let [summary, orders, fills, equity, page] = Self::FILES;
+        let [summary, orders, fills, trades, equity, page] = Self::FILES;
         folder.file(summary, self.json()?.as_bytes())?;
         folder.table(orders, &self.orders)?;
         folder.table(fills, &self.fills)?;
+        folder.table(trades, &self.trades)?;
         folder.table(equity, &self.equity)?;
         folder.file(page, self.page.render()?.as_bytes())?;
         Ok(())
     }
+}
+
+/// `trades`, the round trips in the order in which they were entered: `trade_id, symbol, side ("long", "short"), entered_at,
+/// exited_at, seconds, qty, entry_price, exit_price, gross, fees, net, return, fills`; `exited_at` is empty where something is
+/// still held, and `gross` then counts it at its last price.
+fn trades_table(trips: &[RoundTrip], instruments: &[Instrument]) -> OutputTable {
+    let symbol = |k: usize| instruments.get(k).map(|i| i.symbol.clone());
+    OutputTable::new()
+        .integers("trade_id", (1..=trips.len()).map(|k| k as i64))
+        .texts("symbol", trips.iter().map(|t| symbol(t.instrument)))
+        .texts("side", trips.iter().map(|t| t.word().to_owned()))
+        .times("entered_at", trips.iter().map(|t| t.entered_at))
+        .times("exited_at", trips.iter().map(|t| t.exited_at))
+        .floats("seconds", trips.iter().map(|t| t.seconds))
+        .floats("qty", trips.iter().map(|t| t.quantity))
+        .floats("entry_price", trips.iter().map(|t| t.entry_price))
+        .floats("exit_price", trips.iter().map(|t| t.exit_price))
+        .floats("gross", trips.iter().map(|t| t.gross.to_f64()))
+        .floats("fees", trips.iter().map(|t| t.fees.to_f64()))
+        .floats("net", trips.iter().map(|t| t.net.to_f64()))
+        .floats("return", trips.iter().map(RoundTrip::growth))
+        .integers("fills", trips.iter().map(|t| t.fills as i64))
 }
 
 impl Record {

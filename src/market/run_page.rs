@@ -2,24 +2,30 @@
 
 use chrono::DateTime;
 
-use crate::report::quantity::{UNDEFINED, decimals, number, percent, significant, with_unit};
-use crate::report::{BacktestPage, Cost, Exposure, Fill, InForce, Input, Metric};
+use crate::report::quantity::{UNDEFINED, fine, number, with_unit};
+use crate::report::{BacktestPage, Cost, Exposure, Fall, Fill, InForce, Input, MonthReturn, Trade};
 use crate::sim2real::{Parameter, Simulator, Timestamp};
 
-use super::metric::{Metrics, Returns};
+use super::metric::{Drawdown, Metrics, Month, RoundTrip};
+use super::run_figures::{figure_groups, key_figures};
 use super::{Backtest, EquityPoint, Record, Reference, RunSummary};
 
 /// Fills a page is given: it lists no more.
 const FILLS: usize = 200;
 
 /// The page of `record`, the record of `backtest`, with the figures of `summary`.
-pub(super) fn run_page(summary: &RunSummary, backtest: &Backtest, record: &Record) -> BacktestPage {
+pub(super) fn run_page(summary: &RunSummary, backtest: &Backtest, record: &Record, trips: &[RoundTrip]) -> BacktestPage {
     BacktestPage {
         title: title(summary, backtest, record),
         currency: summary.provenance.currency.clone(),
-        metrics: metrics(summary),
+        metrics: key_figures(summary),
+        figures: figure_groups(summary),
         time: record.equity.iter().map(|point| point.time.0).collect(),
         equity: record.equity.iter().map(|point| point.equity).collect(),
+        months: months(summary, record),
+        zone: summary.provenance.zone.name().to_owned(),
+        drawdowns: summary.metrics.drawdowns.iter().map(fall).collect(),
+        trades: trips.iter().map(|trip| trade(backtest, trip)).collect(),
         exposures: exposures(backtest, record),
         fills: record.blotter.fills.iter().take(FILLS).map(|fill| shown(backtest, fill)).collect(),
         fill_count: record.blotter.fills.len(),
@@ -44,64 +50,6 @@ fn title(summary: &RunSummary, backtest: &Backtest, record: &Record) -> String {
     format!("{} on {}{span}: {gained} after costs, with {fall} on the way.", summary.provenance.strategy, symbols.join(", "))
 }
 
-/// A part of one as a percentage to a hundredth.
-fn fine(part: f64) -> String {
-    format!("{}\u{a0}%", decimals(100.0 * part, 2))
-}
-
-fn metrics(summary: &RunSummary) -> Vec<Metric> {
-    let (m, counts) = (&summary.metrics, &summary.counts);
-    let money = |amount: f64| with_unit(&decimals(amount, 2), &summary.provenance.currency);
-    let rejected: usize = counts.rejected.values().sum();
-    let figure = |name: &str, value: Option<String>, help: String| Metric { name: name.to_owned(), value, help };
-    let a_year = made_yearly(&m.returns);
-    vec![
-        figure("Total return", m.total_return.map(fine), format!("From {}, after costs.", money(m.initial_equity))),
-        figure("Final equity", Some(money(m.final_equity)), "Cash, and positions at their last price.".into()),
-        figure("Return a year", m.cagr.map(fine), format!("Compounded over years of 365.25 days. {a_year}").trim().into()),
-        figure("Sharpe ratio", m.returns.sharpe.map(number), format!("Mean over deviation of daily returns. {a_year}")),
-        figure("Volatility", m.returns.annualised_volatility.map(fine), format!("Deviation of daily returns. {a_year}")),
-        figure("Largest drawdown", m.max_drawdown.map(|d| fine(d.depth)), "Deepest fall from a high of equity.".into()),
-        figure("Turnover", m.turnover.map(number), "Value traded, both ways, over mean equity.".into()),
-        figure("Time invested", m.exposure.map(percent), "Part of all events at which something was held.".into()),
-        figure("Hit rate", m.hit_rate.map(percent), "Part of the closing fills that gained after their own fee.".into()),
-        figure(
-            "Costs",
-            Some(money(m.costs.shortfall)),
-            "Of all fills against the prices at which they were decided, fees included.".into(),
-        ),
-        figure(
-            "Costs of value traded",
-            m.costs.shortfall_bps.map(|bps| format!("{} bps", significant(bps, 3))),
-            "The same over the value traded at the prices of the decisions.".into(),
-        ),
-        figure(
-            "Fills",
-            Some(decimals(counts.fills as f64, 0)),
-            format!(
-                "Of {} orders sent; {} more were refused.",
-                decimals(counts.orders as f64, 0),
-                decimals(rejected as f64, 0)
-            ),
-        ),
-    ]
-}
-
-/// What figures of a year rest on, or why there are none.
-fn made_yearly(returns: &Returns) -> String {
-    let Returns { daily_returns: count, gaps, .. } = *returns;
-    if count < Returns::FEWEST {
-        return format!("Not given for {count} daily returns: it takes {}.", Returns::FEWEST);
-    }
-    let left_out = match gaps {
-        0 => String::new(),
-        1 => " One gap of more than a week is left out.".to_owned(),
-        many => format!(" {many} gaps of more than a week are left out."),
-    };
-    let a_year = returns.returns_per_year.map(number).unwrap_or_default();
-    format!("From {} daily returns, {a_year} of them a year.{left_out}", decimals(count as f64, 0))
-}
-
 /// What was held of each instrument at each point of the equity.
 fn exposures(backtest: &Backtest, record: &Record) -> Vec<Exposure> {
     let one = |(k, instrument): (usize, &super::Instrument)| Exposure {
@@ -124,10 +72,45 @@ fn held(record: &Record, instrument: usize) -> Vec<f64> {
     record.equity.iter().map(at).collect()
 }
 
+fn months(summary: &RunSummary, record: &Record) -> Vec<MonthReturn> {
+    let months = Month::of(summary.metrics.initial_equity, &record.equity, summary.provenance.zone);
+    months.iter().map(|m| MonthReturn { year: m.year, month: m.month, growth: m.growth }).collect()
+}
+
+fn fall(drawdown: &Drawdown) -> Fall {
+    Fall {
+        depth: drawdown.depth,
+        peak_at: drawdown.peak_at.0,
+        trough_at: drawdown.trough_at.0,
+        recovered_at: drawdown.recovered_at.map(|at| at.0),
+        seconds: drawdown.seconds,
+    }
+}
+
+fn trade(backtest: &Backtest, trip: &RoundTrip) -> Trade {
+    Trade {
+        symbol: symbol(backtest, trip.instrument),
+        side: trip.word().to_owned(),
+        entered_at: trip.entered_at.0,
+        exited_at: trip.exited_at.map(|at| at.0),
+        seconds: trip.seconds,
+        quantity: trip.quantity,
+        entry_price: trip.entry_price,
+        exit_price: trip.exit_price,
+        fees: trip.fees.to_f64(),
+        net: trip.net.to_f64(),
+        growth: trip.growth(),
+    }
+}
+
+fn symbol(backtest: &Backtest, instrument: usize) -> String {
+    backtest.instruments().get(instrument).map(|i| i.symbol.clone()).unwrap_or_default()
+}
+
 fn shown(backtest: &Backtest, fill: &super::Fill) -> Fill {
     Fill {
         time: fill.filled_at.0,
-        symbol: backtest.instruments().get(fill.instrument).map(|i| i.symbol.clone()).unwrap_or_default(),
+        symbol: symbol(backtest, fill.instrument),
         side: fill.side.word().to_owned(),
         quantity: fill.quantity.to_f64(),
         price: fill.price.to_f64(),

@@ -2,7 +2,9 @@
 
 use super::page::Page;
 use super::section::ReportError;
-use super::sections::{Assumptions, Costs, Equity, ExposurePlot, Fills, Inputs, Metrics};
+use super::sections::{
+    AllFigures, Assumptions, Costs, Drawdowns, Equity, ExposurePlot, Fills, Inputs, Metrics, Months, RoundTrips,
+};
 
 /// What the page of a backtest shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -13,10 +15,20 @@ pub struct BacktestPage {
     pub currency: String,
     /// Key figures, most important first.
     pub metrics: Vec<Metric>,
+    /// All figures, by what they are about.
+    pub figures: Vec<FigureGroup>,
     /// Times of the equity series [ns since the Unix epoch, UTC], increasing.
     pub time: Vec<i64>,
     /// Equity at each of `time` [currency].
     pub equity: Vec<f64>,
+    /// Returns month by month, in order of time; the page shows those of more than one month.
+    pub months: Vec<MonthReturn>,
+    /// The zone months are counted in, by its IANA name.
+    pub zone: String,
+    /// The deepest falls from a high, the deepest first.
+    pub drawdowns: Vec<Fall>,
+    /// Round trips in the order in which they were entered; the page lists the first, the last and the largest.
+    pub trades: Vec<Trade>,
     /// Positions or exposures at each of `time`.
     pub exposures: Vec<Exposure>,
     /// Fills in order of time; the page lists the first 200.
@@ -40,6 +52,68 @@ pub struct Metric {
     pub value: Option<String>,
     /// What it is and how it was computed, in a sentence.
     pub help: String,
+}
+
+/// Figures about one thing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FigureGroup {
+    /// What they are about: "Return", "Risk".
+    pub title: String,
+    /// The figures.
+    pub figures: Vec<Metric>,
+}
+
+/// The return of a month.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MonthReturn {
+    /// Year.
+    pub year: i32,
+    /// Month of the year, from 1.
+    pub month: u32,
+    /// Return (a fraction); none where it is not defined.
+    pub growth: Option<f64>,
+}
+
+/// A fall of equity from a high.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fall {
+    /// Part of the high that was lost.
+    pub depth: f64,
+    /// When the high was reached last [ns since the Unix epoch, UTC].
+    pub peak_at: i64,
+    /// When it was deepest [ns since the Unix epoch, UTC].
+    pub trough_at: i64,
+    /// When the high was reached again [ns since the Unix epoch, UTC]; none where it was not.
+    pub recovered_at: Option<i64>,
+    /// From the high to the recovery, or else to the end [s].
+    pub seconds: f64,
+}
+
+/// A round trip, from flat to flat.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trade {
+    /// Instrument.
+    pub symbol: String,
+    /// `long` or `short`.
+    pub side: String,
+    /// First fill [ns since the Unix epoch, UTC].
+    pub entered_at: i64,
+    /// Last fill [ns since the Unix epoch, UTC]; none where something is still held.
+    pub exited_at: Option<i64>,
+    /// From the first fill to the last, or to the end [s].
+    pub seconds: f64,
+    /// All that was entered [units of the instrument].
+    pub quantity: f64,
+    /// Average price it was entered at [currency].
+    pub entry_price: f64,
+    /// Average price it was left at [currency]; none where nothing was.
+    pub exit_price: Option<f64>,
+    /// Fees [currency].
+    pub fees: f64,
+    /// Gain after fees [currency]; of what is still held, at its last price.
+    pub net: f64,
+    /// The same over the value entered (a fraction); none where it is not defined.
+    pub growth: Option<f64>,
 }
 
 /// What was held over time.
@@ -114,6 +188,10 @@ impl BacktestPage {
             sections: vec![
                 Box::new(Metrics { page: self }),
                 Box::new(Equity { page: self }),
+                Box::new(Months { page: self }),
+                Box::new(Drawdowns { page: self }),
+                Box::new(AllFigures { page: self }),
+                Box::new(RoundTrips { page: self }),
                 Box::new(ExposurePlot { page: self }),
                 Box::new(Costs { page: self }),
                 Box::new(Assumptions { page: self }),

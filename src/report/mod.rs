@@ -15,7 +15,7 @@ pub(crate) mod quantity;
 mod section;
 mod sections;
 
-pub use backtest::{BacktestPage, Cost, Exposure, Fill, InForce, Input, Metric};
+pub use backtest::{BacktestPage, Cost, Exposure, Fall, FigureGroup, Fill, InForce, Input, Metric, MonthReturn, Trade};
 pub use diagnosis::diagnosis_page;
 pub use figures::{Abscissa, DiagnosisFigures, Trace};
 pub use page::{Badge, Page, Tone};

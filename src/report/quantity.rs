@@ -106,6 +106,27 @@ pub(crate) fn with_unit(text: &str, unit: &str) -> String {
     if unit.is_empty() || text == UNDEFINED { text.into() } else { format!("{text} {unit}") }
 }
 
+/// A length of time in the unit in which it reads best: `45 s`, `3.2 h`, `120 days`.
+pub(crate) fn span(seconds: f64) -> String {
+    const DAY: f64 = 86_400.0;
+    if !seconds.is_finite() {
+        return UNDEFINED.into();
+    }
+    let (value, unit) = match seconds.abs() {
+        s if s < 120.0 => (seconds, "s"),
+        s if s < 7_200.0 => (seconds / 60.0, "min"),
+        s if s < 2.0 * DAY => (seconds / 3_600.0, "h"),
+        _ => (seconds / DAY, "days"),
+    };
+    let places = usize::from(value.abs() < 10.0 && value.fract() != 0.0);
+    format!("{}\u{a0}{unit}", decimals(value, places))
+}
+
+/// A part of one as a percentage to a hundredth.
+pub(crate) fn fine(part: f64) -> String {
+    if part.is_finite() { format!("{}\u{a0}%", decimals(100.0 * part, 2)) } else { UNDEFINED.into() }
+}
+
 /// An axis label: `position [rad]`.
 pub(crate) fn axis(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.into() } else { format!("{name} [{unit}]") }
@@ -179,6 +200,16 @@ mod tests {
             (percent(0.9997), percent(0.98), percent(0.0002)),
             ("> 99.9\u{a0}%".into(), "98\u{a0}%".into(), "< 0.1\u{a0}%".into())
         );
+    }
+
+    #[test]
+    fn time_is_told_in_its_unit() {
+        let spans = [0.5, 90.0, 150.0, 5_400.0, 7_200.0, 108_000.0, 864_000.0].map(span);
+        assert_eq!(
+            spans.map(|s| s.replace('\u{a0}', " ")),
+            ["0.5 s", "90 s", "2.5 min", "90 min", "2 h", "30 h", "10 days"]
+        );
+        assert_eq!((fine(0.012_34), fine(f64::NAN).as_str()), ("1.23\u{a0}%".into(), UNDEFINED));
     }
 
     #[test]

@@ -1,16 +1,28 @@
 //! What a backtest came to, in figures. A figure that is not defined for a run is none, never NaN or infinity.
 
 mod cost;
+mod daily_return;
 mod drawdown;
+mod moment;
+mod month;
 mod returns;
+mod round_trip;
+mod sharpe;
+mod tail;
+mod trading;
 
 use serde::Serialize;
 
 use super::{Fill, Held, Instrument, MoneyError, Record, Status};
+use daily_return::{DailyReturns, closes, years};
 
 pub use cost::Costs;
-pub use drawdown::Drawdown;
+pub use drawdown::{Drawdown, Drawdowns};
+pub use month::Month;
 pub use returns::Returns;
+pub use round_trip::RoundTrip;
+pub use sharpe::{deflated_sharpe, expected_largest_sharpe, probabilistic_sharpe, sharpe_standard_error};
+pub use trading::Trading;
 
 /// The figures of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,19 +35,35 @@ pub struct Metrics {
     pub total_return: Option<f64>,
     /// Return a year of 365.25 days, compounded (a fraction); none where [`Returns::make_a_year`] says no.
     pub cagr: Option<f64>,
-    /// Volatility and Sharpe ratio, with the number of returns they rest on.
+    /// Volatility, Sharpe ratio and the other figures of daily returns, with the number of returns they rest on.
     #[serde(flatten)]
     pub returns: Returns,
     /// The deepest fall from an earlier high; none where equity never fell.
     pub max_drawdown: Option<Drawdown>,
+    /// `cagr` over the depth of `max_drawdown`, over the whole run.
+    ///
+    /// Source: Young, "Calmar ratio: a smoother tool", Futures 20 (1991), there over three years.
+    pub calmar: Option<f64>,
+    /// The deepest falls, at most [`Drawdowns::KEPT`], the deepest first; they do not overlap.
+    pub drawdowns: Vec<Drawdown>,
+    /// The longest time from a high to its recovery, or else to the end [s]; none where equity never fell.
+    pub longest_under_water: Option<f64>,
+    /// Root of the mean square of the drawdowns at the ends of days (a fraction).
+    ///
+    /// Source: Martin and McCann, "The investor's guide to Fidelity funds" (1989), there in percent.
+    pub ulcer_index: Option<f64>,
     /// Value traded, both ways, over mean equity.
     pub turnover: Option<f64>,
+    /// The same a year of 365.25 days; none where [`Returns::make_a_year`] says no.
+    pub turnover_per_year: Option<f64>,
     /// Part of all events at which something was held.
     pub exposure: Option<f64>,
     /// Mean over all events of what was held, short positions counted as positive, over equity.
     pub mean_leverage: Option<f64>,
     /// Part of the fills that closed something which gained after their own fee.
     pub hit_rate: Option<f64>,
+    /// What round trips came to.
+    pub trading: Trading,
     /// Gain on what was closed, at average cost, before fees [currency].
     pub realised: f64,
     /// Gain on what is still held, at its last price, before fees [currency].
@@ -90,7 +118,7 @@ impl Metrics {
         let last = record.ledger.equity()?.to_f64();
         let points = &record.equity;
         let years = match (points.first(), points.last()) {
-            (Some(first), Some(last)) => returns::years(first.time, last.time),
+            (Some(first), Some(last)) => years(first.time, last.time),
             _ => 0.0,
         };
         let growth = if initial > 0.0 { defined(last / initial) } else { None };
@@ -103,18 +131,30 @@ impl Metrics {
         }
         let Held { events, invested, leverage, .. } = record.held;
         let per_event = |sum: f64| if events > 0 { Some(sum / events as f64) } else { None };
-        let returns = Returns::of(points);
+        let days = closes(points);
+        let returns = Returns::of_daily(&DailyReturns::of(&days));
+        let yearly = returns.make_a_year();
+        let Drawdowns { deepest: drawdowns, longest } = Drawdowns::of(initial, points);
+        let cagr = growth.filter(|g| *g > 0.0 && yearly).and_then(|g| defined(g.powf(1.0 / years) - 1.0));
+        let turnover = if mean_equity > 0.0 { defined(traded / mean_equity) } else { None };
+        let max_drawdown = drawdowns.first().copied();
         Ok(Self {
             initial_equity: initial,
             final_equity: last,
             total_return: growth.map(|g| g - 1.0),
-            cagr: growth.filter(|g| *g > 0.0 && returns.make_a_year()).and_then(|g| defined(g.powf(1.0 / years) - 1.0)),
+            cagr,
             returns,
-            max_drawdown: Drawdown::deepest(initial, points),
-            turnover: if mean_equity > 0.0 { defined(traded / mean_equity) } else { None },
+            max_drawdown,
+            calmar: cagr.zip(max_drawdown).and_then(|(cagr, fall)| defined(cagr / fall.depth)),
+            drawdowns,
+            longest_under_water: longest,
+            ulcer_index: drawdown::ulcer_index(initial, &days),
+            turnover,
+            turnover_per_year: turnover.filter(|_| yearly).and_then(|turnover| defined(turnover / years)),
             exposure: per_event(invested as f64),
             mean_leverage: per_event(leverage),
             hit_rate: hit_rate(&record.blotter.fills),
+            trading: Trading::of(&RoundTrip::of(record)?),
             realised,
             unrealised,
             costs: Costs::of(&record.blotter),
@@ -165,5 +205,17 @@ impl InstrumentSummary {
                 fills: record.blotter.fills.iter().filter(|fill| fill.instrument == k).count(),
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::market::EquityPoint;
+    use crate::sim2real::Timestamp;
+
+    /// Equity every `spacing` nanoseconds.
+    pub(super) fn curve(spacing: i64, values: &[f64]) -> Vec<EquityPoint> {
+        let point = |(k, v): (usize, &f64)| EquityPoint { time: Timestamp((k as i64 + 1) * spacing), equity: *v };
+        values.iter().enumerate().map(point).collect()
     }
 }

@@ -58,12 +58,12 @@ impl Section for Fills<'_> {
 }
 
 /// Whole numbers in full, others as on an axis.
-fn exact(quantity: f64) -> String {
+pub(super) fn exact(quantity: f64) -> String {
     if quantity.fract() == 0.0 { decimals(quantity, 0) } else { tick(quantity) }
 }
 
 /// At least two decimals, up to four where the price has them.
-fn price(price: f64) -> String {
+pub(super) fn price(price: f64) -> String {
     let text = decimals(price, 4);
     text.strip_suffix("00").map_or(text.clone(), str::to_owned)
 }
