@@ -242,11 +242,8 @@ impl Dynamics<Execution> for Execution {
         for (((report, met), order), effect) in reports.iter_mut().zip(met).zip(orders).zip(effects) {
             let price = met.reference + order.side.sign() * effect.concession;
             // What is held is held, however much is traded.
-            let quantity = if order.role == Role::Holder {
-                order.quantity
-            } else {
-                whole_lots(order.fillable(met.volume), effect.lot)
-            };
+            let quantity =
+                if order.role == Role::Holder { order.quantity } else { whole_lots(order.fillable(met.volume), effect.lot) };
             *report = Report::of(order, price, quantity);
         }
     }

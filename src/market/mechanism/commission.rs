@@ -42,8 +42,7 @@ impl Mechanism<Execution> for Commission {
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
         let bps = |name, starts: &[f64]| Parameter::new(name, "bps", 0.0).within(-100.0, 1_000.0).starting_at(starts);
-        let per_share =
-            || Parameter::new("per_share", "currency/unit", 0.0).within(-1e3, 1e4).starting_at(&[0.001, 0.005]);
+        let per_share = || Parameter::new("per_share", "currency/unit", 0.0).within(-1e3, 1e4).starting_at(&[0.001, 0.005]);
         let minimum = || Parameter::new("minimum", "currency", 0.0).within(0.0, 1e6).starting_at(&[0.35, 1.0]);
         let maximum =
             Parameter::new("maximum_bps", "bps", f64::INFINITY).within(0.0, f64::INFINITY).starting_at(&[100.0, 50.0]);

@@ -49,12 +49,7 @@ pub(super) fn concession(law: &mut dyn Law<Execution>, time: f64, order: InFligh
 }
 
 /// What each of `children` concedes to form `form` of `mechanism` with the values `theta` [bps of the mid].
-pub(super) fn concessions(
-    mechanism: &dyn Mechanism<Execution>,
-    form: usize,
-    theta: &[f64],
-    children: &[Child],
-) -> Vec<f64> {
+pub(super) fn concessions(mechanism: &dyn Mechanism<Execution>, form: usize, theta: &[f64], children: &[Child]) -> Vec<f64> {
     let mut law = mechanism.law(form, &Thetas::single(theta), Seed(1));
     let bps = |child: &Child| concession(law.as_mut(), child.time, child.order()) / MID * 1e4;
     children.iter().map(bps).collect()
