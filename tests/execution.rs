@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use trueup::market::{
-    Bar, Execution, Instrument, Level, LogError, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog, OrderType, Price,
-    PriceAssumption, Print, Quotes, Side, Tape,
+    Bar, Execution, InFlight, Instrument, Level, LogError, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog,
+    OrderType, Price, PriceAssumption, Print, Quotes, Role, Side, Tape,
 };
 use trueup::sim2real::{
-    Assembly, Candidate, Plant, Recording, Seed, Simulator, Thetas, Timestamp, Twin, check_mechanism, check_plant,
+    Assembly, Candidate, Plant, Recording, Seed, Simulator, Thetas, Timestamp, Twin, Typical, check_mechanism, check_plant,
 };
 
 const SECOND: i64 = Timestamp::NANOS;
@@ -135,6 +135,25 @@ fn on_bars(price: PriceAssumption) -> Recording<OrderLog> {
     log(Tape::new(Quotes::default(), Vec::new(), (-1..ORDERS + 1).map(bar).collect()), price, &orders(), &fills()).unwrap()
 }
 
+/// Orders that take and that rest, each on its way for 0.2 s, and positions long and short, charged for ten hours each: all
+/// that any row of the registry may act on.
+fn planned() -> Recording<OrderLog> {
+    let tape = Arc::new(Tape::new(quotes(), prints(), Vec::new()));
+    let market = LogMarket { instrument: instrument(), tape, price: PriceAssumption::Mid };
+    let recording = full();
+    let sent = recording.stimulus.orders().iter().enumerate().map(|(k, order)| match k % 4 {
+        0 | 1 => order.arriving(order.decided_at + DELAY),
+        2 => order.as_a(Role::Maker),
+        _ => {
+            // Every other of the positions is short.
+            let side = if k % 8 == 3 { Side::Sell } else { Side::Buy };
+            let held = InFlight { side, ..*order };
+            held.as_a(Role::Holder).arriving(order.decided_at + 36_000 * SECOND)
+        }
+    });
+    OrderLog::planned("planned", market, sent.collect())
+}
+
 fn with(
     assembly: Assembly<Execution>,
     recording: &Recording<OrderLog>,
@@ -164,14 +183,65 @@ fn bare() -> Assembly<Execution> {
 
 #[test]
 fn the_plant_and_every_row_of_the_registry_keep_their_contracts() {
-    for recording in [full(), on_bars(PriceAssumption::BarClose), on_bars(PriceAssumption::NextOpen)] {
+    // What a log of market orders, which arrive as they are decided, has nothing of.
+    let of_others = ["adverse_selection", "borrow_fee", "funding", "volatility_slippage", "commission"];
+    for recording in [planned(), full(), on_bars(PriceAssumption::BarClose), on_bars(PriceAssumption::NextOpen)] {
         check_plant(&Execution, MECHANISMS, &recording).unwrap();
         for mechanism in MECHANISMS {
+            let name = mechanism.about().name;
             // The delays it starts at are shorter than the bars: no close is missed by them.
-            if recording.stimulus.price() != PriceAssumption::BarClose || mechanism.about().name != "command_delay" {
+            let missed = recording.stimulus.price() == PriceAssumption::BarClose && name == "command_delay";
+            if recording.name == "planned" || !missed && !of_others.contains(&name) {
                 check_mechanism(*mechanism, &Execution, MECHANISMS, &recording).unwrap();
             }
         }
+    }
+}
+
+#[test]
+fn what_takers_pay_is_no_cost_of_those_who_rest_and_only_positions_are_charged_for_time() {
+    let recording = planned();
+    let orders = recording.stimulus.orders();
+    let bare = bare().rollout(&Thetas::single(&[]), &recording, 0..recording.len(), Seed(1)).remove(0);
+    let typical = Execution.typical(std::slice::from_ref(&recording));
+    for mechanism in MECHANISMS {
+        let about = mechanism.about();
+        for (form, stated) in mechanism.forms(&typical).into_iter().enumerate() {
+            let values: Vec<f64> = stated.parameters.iter().map(|p| *p.starts.last().unwrap()).collect();
+            let with = Assembly::new(Execution, MECHANISMS).with_mechanism(*mechanism, form, stated.parameters);
+            let found = with.rollout(&Thetas::single(&values), &recording, 0..recording.len(), Seed(1)).remove(0);
+            let touches = |role: Role| {
+                let of_role = (0..recording.len()).filter(|row| orders[*row].role == role);
+                of_role.into_iter().any(|row| (0..3).any(|k| found[k].samples[row] != bare[k].samples[row]))
+            };
+            let touched = [Role::Taker, Role::Maker, Role::Holder].map(touches);
+            let expected = match about.name {
+                "commission" | "lot_size" | "participation_cap" => [true, true, false],
+                "adverse_selection" => [false, true, false],
+                "borrow_fee" | "funding" => [false, false, true],
+                // No cost of its own: whoever comes later meets another book.
+                "command_delay" => continue,
+                _ => [true, false, false],
+            };
+            assert_eq!(touched, expected, "{} {}: takers, makers, holders", about.name, stated.name);
+        }
+    }
+}
+
+#[test]
+fn what_earlier_rows_left_is_met_by_a_run_that_starts_in_the_middle() {
+    let recording = full();
+    for (name, form, values) in
+        [("permanent_impact", 0, vec![5e3]), ("permanent_impact", 1, vec![500.0]), ("transient_impact", 0, vec![5e3, 600.0])]
+    {
+        let mechanism = MECHANISMS.iter().find(|m| m.about().name == name).unwrap();
+        let parameters = mechanism.forms(&Typical::default())[form].parameters.clone();
+        let assembly = bare().with_mechanism(*mechanism, form, parameters);
+        let follow =
+            |rows| assembly.rollout(&Thetas::single(&values), &recording, rows, Seed(1)).remove(0).remove(0).samples;
+        let whole = follow(0..recording.len());
+        assert_eq!(follow(25..recording.len()), whole[25..], "{name}");
+        assert!((whole[25] - follow(25..26)[0]).abs() == 0.0 && whole[25].abs() > 0.01, "{name}: {}", whole[25]);
     }
 }
 

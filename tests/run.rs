@@ -278,7 +278,7 @@ fn a_mechanism_that_lacks_its_data_is_an_error_before_the_run() {
       hint: add [[data]] with quotes, or give half_spread as bps
     ");
     insta::assert_snapshot!(with("name = 'half_spread'\nfraction = 1.0", BARS), @"
-    run.toml:16:1: `half_spread` needs quotes for a fraction of the spread, and there are none of `XYZ`
+    run.toml:16:1: `half_spread` needs quotes, and there are none of `XYZ`
       hint: add [[data]] with quotes, or give half_spread as bps
     ");
     insta::assert_snapshot!(with("name = 'sqrt_impact'\nbps_at_full_participation = 10.0", BARS), @"
@@ -289,8 +289,18 @@ fn a_mechanism_that_lacks_its_data_is_an_error_before_the_run() {
     run.toml:16:1: `participation_cap` needs volumes, and there are none of `XYZ`
       hint: add [[data]] with bars that know volumes, or with quotes that know sizes
     ");
+    insta::assert_snapshot!(with("name = 'textbook_slippage'", BARS), @"
+    run.toml:16:1: `textbook_slippage` needs volumes, and there are none of `XYZ`
+      hint: add average_daily_volume to [[instrument]], or bars with volumes: days that are over are averaged
+    ");
+    insta::assert_snapshot!(with("name = 'volatility_slippage'\nfraction = 0.05", BARS), @"
+    run.toml:16:1: `volatility_slippage` needs volatilities, and there are none of `XYZ`
+      hint: add daily_volatility to [[instrument]], or more than a week of data: it is that of days that are over
+    ");
     let traded = BARS.replace(",0\n", ",5\n");
     for mechanism in [
+        "name = 'textbook_slippage'",
+        "name = 'transient_impact'\nbps_at_full_participation = 100.0\nrecovery = 60.0",
         "name = 'half_spread'\nbps = 1.0",
         "name = 'sqrt_impact'\nbps_at_full_participation = 10.0",
         "name = 'participation_cap'\nfraction = 0.1",

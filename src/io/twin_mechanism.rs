@@ -2,7 +2,7 @@
 
 use super::document::Document;
 use super::error::{InputError, hint_among};
-use super::quantity::MechanismEntry;
+use super::quantity::{DEFAULT_UNCERTAINTY, MechanismEntry};
 use super::unit::check_unit;
 use crate::sim2real::{Mechanism, Parameter, Plant, Registry};
 
@@ -10,7 +10,7 @@ use crate::sim2real::{Mechanism, Parameter, Plant, Registry};
 pub type ListedMechanism<P> = (&'static dyn Mechanism<P>, usize, Vec<Parameter>);
 
 /// The row of `registry` that the `index`-th `[[mechanism]]` of `document` names, in the form its keys say, with its
-/// values; `plant` says which units these have on it.
+/// values; `plant` says which units these have on it. One without keys stands for its customary values, if it has any.
 ///
 /// # Errors
 /// An id, a key, a unit or a value that the registry does not know; keys that make up no form.
@@ -36,6 +36,12 @@ pub fn listed_mechanism<P: Plant>(
     let whole = |parameters: &[Parameter]| {
         parameters.len() == entry.parameters.len() && parameters.iter().all(|p| entry.parameter(&p.name).is_some())
     };
+    if let Some((form, values)) = mechanism.customary().filter(|_| entry.parameters.is_empty()) {
+        let stated = forms[form].parameters.iter().cloned().zip(values);
+        let prior = |value: f64| Some(DEFAULT_UNCERTAINTY * value.abs());
+        let parameters = stated.map(|(p, value)| Parameter { nominal: value, prior: prior(value), ..p }).collect();
+        return Ok((*mechanism, form, parameters));
+    }
     let Some(form) = forms.iter().position(|form| whole(&form.parameters)) else {
         let ways: Vec<String> = forms
             .iter()

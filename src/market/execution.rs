@@ -2,7 +2,7 @@
 //! that leaves out are mechanisms.
 
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Timestamp, Typical,
 };
 
 use super::{Book, InFlight, OrderLog, Role, Side};
@@ -23,13 +23,21 @@ pub struct Met {
 pub struct ExecutionEffect {
     /// By how much the price is worse than the reference [currency]; negative where it is better.
     pub concession: f64,
+    /// Orders are filled in whole multiples of it [units]; 0 where any quantity can be filled.
+    pub lot: f64,
 }
 
-/// What is reported of an order.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// What is reported of an order, or of a position that is held.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Report {
     /// As what the order met the market.
     pub role: Role,
+    /// Which way it trades; of a position, `Buy` where it is long.
+    pub side: Side,
+    /// When it was decided; of a position, when it was charged last.
+    pub since: Timestamp,
+    /// When it arrived.
+    pub until: Timestamp,
     /// Average price [currency].
     pub price: f64,
     /// Quantity filled [units].
@@ -40,6 +48,59 @@ pub struct Report {
     pub cost: f64,
     /// Part of the order that was filled, from 0 to 1.
     pub filled: f64,
+}
+
+impl Default for Report {
+    /// Nothing has happened yet.
+    fn default() -> Self {
+        Self {
+            role: Role::default(),
+            side: Side::Buy,
+            since: Timestamp::default(),
+            until: Timestamp::default(),
+            price: 0.0,
+            quantity: 0.0,
+            fee: 0.0,
+            cost: 0.0,
+            filled: 0.0,
+        }
+    }
+}
+
+impl Report {
+    /// What is reported of `order` where `quantity` [units] of it is filled, or held, at `price` [currency], without a fee.
+    #[must_use]
+    pub fn of(order: &InFlight, price: f64, quantity: f64) -> Self {
+        Self {
+            role: order.role,
+            side: order.side,
+            since: order.decided_at,
+            until: order.arrives_at,
+            price,
+            quantity,
+            fee: 0.0,
+            cost: cost_bps(order.side, price, order.assumed, order.mid),
+            filled: quantity / order.quantity,
+        }
+    }
+
+    /// From decision to arrival; of a position, the time it is charged for [s].
+    #[must_use]
+    pub fn held_for(&self) -> f64 {
+        self.until.seconds_since(self.since).max(0.0)
+    }
+
+    /// Whether it tells of a trade, and not of a position that is held.
+    #[must_use]
+    pub fn trades(&self) -> bool {
+        self.role != Role::Holder
+    }
+
+    /// What changed hands, or is held [currency].
+    #[must_use]
+    pub fn notional(&self) -> f64 {
+        self.price * self.quantity
+    }
 }
 
 /// Cost of an order of `side` that filled at `price` although `assumed` was expected [bps of `mid`]; a loss is positive.
@@ -58,7 +119,7 @@ impl Observation for Report {
     fn channel(&self, k: usize) -> f64 {
         match k {
             0 => self.cost,
-            1 => fee_bps(self.fee, self.price * self.quantity).unwrap_or(0.0),
+            1 => fee_bps(self.fee, self.notional()).unwrap_or(0.0),
             _ => self.filled,
         }
     }
@@ -166,6 +227,12 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
+/// The largest multiple of `lot` that is in `quantity`; all of it where there are no lots. What is short of one by no more than
+/// its last digits counts as one.
+fn whole_lots(quantity: f64, lot: f64) -> f64 {
+    if lot > 0.0 { ((quantity / lot) * (1.0 + 1e-12)).floor() * lot } else { quantity }
+}
+
 impl Dynamics<Execution> for Execution {
     fn initial(&self, initial: &Thetas) -> Vec<Report> {
         vec![Report::default(); initial.lanes()]
@@ -174,15 +241,10 @@ impl Dynamics<Execution> for Execution {
     fn advance(&self, _tick: Tick, reports: &mut [Report], met: &[Met], orders: &[InFlight], effects: &[ExecutionEffect]) {
         for (((report, met), order), effect) in reports.iter_mut().zip(met).zip(orders).zip(effects) {
             let price = met.reference + order.side.sign() * effect.concession;
-            let quantity = order.fillable(met.volume);
-            *report = Report {
-                role: order.role,
-                price,
-                quantity,
-                fee: 0.0,
-                cost: cost_bps(order.side, price, order.assumed, order.mid),
-                filled: quantity / order.quantity,
-            };
+            // What is held is held, however much is traded.
+            let quantity =
+                if order.role == Role::Holder { order.quantity } else { whole_lots(order.fillable(met.volume), effect.lot) };
+            *report = Report::of(order, price, quantity);
         }
     }
 

@@ -7,7 +7,7 @@ use crate::sim2real::{Measured, Recording, Stimulus, Timestamp};
 use super::log_entry::fills_of_orders;
 use super::{
     Book, Execution, InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, Met, OrderType, Piece,
-    PriceAssumption, Seen, Tape, cost_bps, fee_bps, own_print, shown_delay,
+    PriceAssumption, Role, Seen, Tape, cost_bps, fee_bps, own_print, shown_delay,
 };
 
 /// Where the orders of a log went, and what a backtest assumes of them.
@@ -73,6 +73,24 @@ impl OrderLog {
         let time = log.orders.iter().map(|order| order.decided_at.seconds_since(first)).collect();
         let measured = log.measure(&executions);
         Ok(Recording { name: name.to_owned(), time, stimulus: log, measured })
+    }
+
+    /// The recording of `orders` as they would be sent, in the order of their decisions, of which nothing is measured: what they
+    /// would cost is for a rollout to say. Orders may rest, and positions may be held among them.
+    #[must_use]
+    pub fn planned(name: &str, market: LogMarket, mut orders: Vec<InFlight>) -> Recording<Self> {
+        orders.sort_by_key(|order| order.decided_at);
+        let first = orders.first().map_or_else(Timestamp::default, |order| order.decided_at);
+        let time = orders.iter().map(|order| order.decided_at.seconds_since(first)).collect();
+        let lost = |(channel, unit): (&str, &str)| Measured {
+            channel: channel.into(),
+            unit: unit.into(),
+            samples: vec![None; orders.len()],
+        };
+        let measured = [("cost", "bps"), ("fee", "bps"), ("filled", "")].map(lost).into();
+        let own_prints = vec![None; orders.len()];
+        let log = Self { market, orders, own_prints, shown_delay: None, notes: Vec::new() };
+        Recording { name: name.to_owned(), time, stimulus: log, measured }
     }
 
     /// What is known of the channels, order by order; notes what is not.
@@ -149,6 +167,12 @@ impl OrderLog {
     #[must_use]
     pub fn shown_delay(&self) -> Option<f64> {
         self.shown_delay
+    }
+
+    /// Whether any of the orders meets the market as a `role`.
+    #[must_use]
+    pub fn has_a(&self, role: Role) -> bool {
+        self.orders.iter().any(|order| order.role == role)
     }
 
     /// Whether the tape knows the volume an order meets.

@@ -41,7 +41,7 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     }
     let joined = instruments.iter().enumerate().map(|(index, instrument)| joined(run, index, &instrument.symbol, &mut read));
     let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
-    run_needs::check(run, &instruments, &histories)?;
+    run_needs::check(run, &venue, &instruments, &histories)?;
     let cash = Cash::nearest(run.run.cash).map_err(|error| money(run, &["run", "cash"], &error))?;
     let borrowing_nothing = Settings::with_cash(cash);
     let settings = Settings {

@@ -7,7 +7,7 @@ use crate::io::{DEFAULT_UNCERTAINTY, InputError, MarketFiles, TwinFile, listed_m
 use crate::sim2real::{Assembly, Mechanism, Plant, Recording};
 
 use super::log_folder::{LogSettings, read_log};
-use super::mechanism::Commission;
+use super::mechanism::{Commission, needs};
 use super::tape_file::{TapeFiles, read_tape};
 use super::{Execution, Instrument, MECHANISMS, OrderLog, PriceAssumption};
 
@@ -25,13 +25,13 @@ pub fn execution_twin(
     let recordings = execution_logs(twin, folders)?;
     for (index, entry) in twin.mechanisms.iter().enumerate() {
         let (mechanism, form, _) = listed_mechanism(twin.document(), index, entry, &Execution, MECHANISMS)?;
-        // A constant spread may well stand beside quotes: there it is only not what diagnosis would propose.
-        let needs_nothing = entry.name == "half_spread" && entry.parameter("bps").is_some();
-        let lacking = |log: &&Recording<OrderLog>| !needs_nothing && !mechanism.applies(form, &Execution, &log.stimulus);
+        // What a diagnosis would not propose may well be modelled: a constant spread stands beside quotes.
+        let needs = needs(mechanism.about().name, form);
+        let lacking = |log: &&Recording<OrderLog>| needs.iter().any(|need| !need.is_known_in(&log.stimulus));
         if let Some(log) = recordings.iter().find(lacking) {
             let message = format!("the log {} lacks the data `{}` needs in this form", log.name, entry.name);
             return Err(twin.error(&["mechanism", &index.to_string(), "name"], message).hint(
-                "a fraction of the spread and a walk need quotes, an impact the average_daily_volume, a cap volumes",
+                "a fraction of the spread and a walk need quotes, an impact the average_daily_volume, a slippage the daily_volatility, a cap volumes",
             ));
         }
     }

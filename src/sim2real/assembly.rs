@@ -152,14 +152,18 @@ impl<P: Plant> Assembly<P> {
         for part in &self.parts {
             let about = part.mechanism.about();
             let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
-            let law = part.mechanism.law(part.form, &thetas.block(at, count), seed.child(about.name));
+            let own = thetas.block(at, count);
+            at += count;
+            let law = match self.quiet && !part.mechanism.followed(part.form) {
+                true => part.mechanism.mean(part.form, &own),
+                false => Some(part.mechanism.law(part.form, &own, seed.child(about.name))),
+            };
+            let Some(law) = law else { continue };
             match part.mechanism.site(part.form) {
-                _ if self.quiet && !part.mechanism.followed(part.form) => {}
                 Site::Command => run.command_laws.push(law),
                 Site::Plant => run.plant_laws.push(law),
                 Site::Observation => run.observation_laws.push(law),
             }
-            at += count;
         }
         run
     }
@@ -276,12 +280,14 @@ impl<P: Plant> Assembly<P> {
     ) -> Vec<Trajectory> {
         let own = self.parameters.len();
         let mut run = self.run(&thetas.block(0, own), &thetas.block(own, thetas.parameters() - own), seed);
-        let shaping = self.parts.iter().filter(|part| part.mechanism.site(part.form) == Site::Command);
-        let memory = shaping.map(|part| part.mechanism.memory()).fold(0.0, f64::max);
+        // What acts in a plant that moves has left its traces in the state; an order finds no other state than the laws' own.
+        let events = self.clock() == Clock::Event;
+        let lasting = self.parts.iter().filter(|part| events || part.mechanism.site(part.form) == Site::Command);
+        let memory = lasting.map(|part| part.mechanism.memory()).fold(0.0, f64::max);
         let memory = memory + self.controller.as_ref().map_or(0.0, |controller| controller.memory());
         let mut out = Collected::new(self.channels(), thetas.lanes(), rows.len(), every);
         match self.clock() {
-            Clock::Event => out.follow_events(&mut run, recording, rows),
+            Clock::Event => out.follow_events(&mut run, recording, rows, memory),
             clock => out.follow_samples(&mut run, recording, rows, clock, memory),
         }
         out.trajectories()

@@ -76,12 +76,26 @@ impl Collected {
     }
 
     /// Rows are messages: the observation of a row is the reply to its command.
-    pub fn follow_events<P: Plant>(&mut self, run: &mut Run<P>, recording: &Recording<P::Stimulus>, rows: Range<usize>) {
-        for row in rows {
+    ///
+    /// Messages of the last `memory` [s] before them are answered too, and nobody hears of it: what they left behind is met.
+    pub fn follow_events<P: Plant>(
+        &mut self,
+        run: &mut Run<P>,
+        recording: &Recording<P::Stimulus>,
+        rows: Range<usize>,
+        memory: f64,
+    ) {
+        let since = recording.time.get(rows.start).map_or(0.0, |start| start - memory);
+        let warm = recording.time[..rows.start].partition_point(|t| *t < since);
+        for row in warm..rows.end {
             let tick = Tick { index: row, time: recording.time[row], step: 0.0 };
             run.send(tick, &recording.stimulus.command(row));
             run.advance(tick, |arriving| recording.stimulus.input(row, arriving));
-            self.record(run, tick.time);
+            if row >= rows.start {
+                self.record(run, tick.time);
+            } else {
+                run.observe(tick.time);
+            }
         }
     }
 

@@ -147,6 +147,14 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn followed(&self, _form: usize) -> bool {
         true
     }
+    /// What is left of form `form` where nothing random may happen, if it cannot be followed: its mean, or nothing.
+    fn mean(&self, _form: usize, _thetas: &Thetas) -> Option<Box<dyn Law<P>>> {
+        None
+    }
+    /// The form and the values of its parameters that are meant where a document names it and says no more.
+    fn customary(&self) -> Option<(usize, Vec<f64>)> {
+        None
+    }
     /// Whether form `form` only rounds what is reported: tried as it is once everything else is fitted, for what jumps has
     /// no gradient to follow.
     fn finishing(&self, _form: usize) -> bool {
@@ -157,7 +165,7 @@ pub trait Mechanism<P: Plant>: Send + Sync {
         None
     }
     /// For how long what it did before matters to what it does [s]: a run that starts in the middle of a recording sees
-    /// the commands of as long a time before.
+    /// the commands of as long a time before. Of signals this concerns laws that shape commands alone; the state has the rest.
     fn memory(&self) -> f64 {
         1.0
     }

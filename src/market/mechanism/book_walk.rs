@@ -3,6 +3,8 @@
 use crate::market::{Execution, ExecutionEffect, OrderLog};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
+use super::need::{Demanding, Need, known};
+
 /// `price = touch + side * fraction * |VWAP of the displayed levels up to the quantity - touch|`.
 ///
 /// 1 is the walk through the book as it is displayed; less where hidden orders sit within it, more where displayed
@@ -32,16 +34,18 @@ impl Mechanism<Execution> for BookWalk {
         Form::only(vec![Parameter::new("fraction", "", 0.0).within(0.0, 3.0).starting_at(&[0.5, 1.0])])
     }
 
-    /// It needs quotes that know sizes.
-    fn applies(&self, _form: usize, _plant: &Execution, log: &OrderLog) -> bool {
-        let quotes = log.tape().quotes().all();
-        (0..quotes.len()).any(|k| {
-            quotes.get(k).is_some_and(|quote| quote.bids.iter().chain(quote.asks).any(|level| level.size.is_finite()))
-        })
+    fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
+        known(self.needs(form), log)
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
         Box::new(Walk { fraction: thetas.row(0).to_vec() })
+    }
+}
+
+impl Demanding for BookWalk {
+    fn needs(&self, _form: usize) -> &'static [Need] {
+        &[Need::Quotes, Need::Sizes]
     }
 }
 

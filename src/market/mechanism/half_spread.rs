@@ -3,6 +3,8 @@
 use crate::market::{Execution, ExecutionEffect, OrderLog};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
+use super::need::{Demanding, Need};
+
 /// `price = reference + side * fraction * (ask - bid) / 2`, or `reference + side * bps * mid / 1e4` where no quotes are
 /// known.
 ///
@@ -41,11 +43,17 @@ impl Mechanism<Execution> for HalfSpread {
 
     /// The fraction needs quotes; where there are quotes they, and no constant, say what the spread was.
     fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
-        (form == FRACTION) != log.tape().quotes().is_empty()
+        (form == FRACTION) == Need::Quotes.is_known_in(log)
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
         Box::new(Concession { of_spread: form == FRACTION, size: thetas.row(0).to_vec() })
+    }
+}
+
+impl Demanding for HalfSpread {
+    fn needs(&self, form: usize) -> &'static [Need] {
+        if form == FRACTION { &[Need::Quotes] } else { &[] }
     }
 }
 

@@ -3,6 +3,8 @@
 use crate::market::{Execution, InFlight, OrderLog};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
 
+use super::need::{Demanding, Need, known};
+
 /// `quantity filled = min(quantity, fraction * volume met)`; what is left is cancelled.
 ///
 /// The volume met is that of the bar in which the order arrives; where there are only quotes, what is displayed on the
@@ -32,13 +34,18 @@ impl Mechanism<Execution> for ParticipationCap {
         Form::only(vec![Parameter::new("fraction", "", f64::INFINITY).within(0.0, f64::INFINITY).starting_at(&starts)])
     }
 
-    /// It needs a tape that knows volumes.
-    fn applies(&self, _form: usize, _plant: &Execution, log: &OrderLog) -> bool {
-        log.knows_volume()
+    fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
+        known(self.needs(form), log)
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
         Box::new(Cap { fraction: thetas.row(0).to_vec() })
+    }
+}
+
+impl Demanding for ParticipationCap {
+    fn needs(&self, _form: usize) -> &'static [Need] {
+        &[Need::Volume]
     }
 }
 

@@ -3,6 +3,8 @@
 use crate::market::{Execution, ExecutionEffect, OrderLog};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
+use super::need::{Demanding, Need, known};
+
 /// `price = reference + side * bps * sqrt(Q / V) * mid / 1e4`, with Q the quantity filled and V the units
 /// traded on an average day; `bps` is `bps_at_full_participation`, the concession of an order as large as a day's
 /// volume.
@@ -33,13 +35,18 @@ impl Mechanism<Execution> for SqrtImpact {
         ])
     }
 
-    /// It needs the average daily volume.
-    fn applies(&self, _form: usize, _plant: &Execution, log: &OrderLog) -> bool {
-        log.instrument().average_daily_volume.is_some()
+    fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
+        known(self.needs(form), log)
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
         Box::new(Impact { bps: thetas.row(0).to_vec() })
+    }
+}
+
+impl Demanding for SqrtImpact {
+    fn needs(&self, _form: usize) -> &'static [Need] {
+        &[Need::DailyVolume]
     }
 }
 

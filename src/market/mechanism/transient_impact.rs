@@ -1,0 +1,186 @@
+//! Impact that decays: the price one's own next orders meet, the less of it the later they come.
+
+use crate::market::{Execution, ExecutionEffect, OrderLog};
+use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+
+use super::need::{Demanding, Need, known};
+use super::propagator::Propagator;
+
+/// `price = reference + side * (D + own / 2) * mid / 1e4`: an order pays what earlier orders of one's own have left of the
+/// displacement `D`, and half of what it adds itself.
+///
+/// An order of quantity Q moves the price by `own = side * bps * Q / V` [bps], V being the units traded on an average day and
+/// `bps` that of a day's volume; of it `G(t)` is left after a time t. Form `exponential`: `G(t) = exp(-t / recovery)`, the
+/// resilience of a book that fills up again; half of a displacement is gone after `0.69 * recovery`. Form `power`:
+/// `G(t) = (1 + t / lag)^(-exponent)`, the propagator, as the sum of exponentials that it is, so that memory does not grow.
+///
+/// A quantity that is split pays less than as one block, the less the longer it takes. A sale soon after purchases meets the
+/// price they have lifted, and gets some of it back: less than was paid for it. With a `G` that is positive, falling and convex,
+/// as both forms are, and impact linear in the quantity, no round trip gains (Gatheral; Alfonsi, Schied & Slynko); a
+/// square-root law with exponential decay would let one gain, which is why there is none here.
+///
+/// The tape does not react: where it was recorded while the orders were sent, it shows what they left, and the law finds
+/// nothing besides. Orders follow each other by when they meet the market.
+///
+/// Source: Obizhaeva & Wang, "Optimal trading strategy and supply/demand dynamics", Journal of Financial Markets 16 (2013);
+/// Bouchaud, Gefen, Potters & Wyart, "Fluctuations and response in financial markets", Quantitative Finance 4 (2004), who
+/// find exponents of 0.2 to 0.4; Gatheral, "No-dynamic-arbitrage and market impact", Quantitative Finance 10 (2010); Alfonsi,
+/// Schied & Slynko, SIAM Journal on Financial Mathematics 3 (2012).
+#[derive(Debug, Clone, Copy)]
+pub struct TransientImpact;
+
+const EXPONENTIAL: usize = 0;
+
+impl Mechanism<Execution> for TransientImpact {
+    fn about(&self) -> About {
+        About {
+            name: "transient_impact",
+            site: Site::Plant,
+            title: "transient impact",
+            law: "concession = what is left of earlier own impact + half of bps * Q / V; exp(-t/recovery) of it is left, or (1 + t/lag)^-exponent",
+            source: "Obizhaeva & Wang, JFM 16 (2013); Bouchaud et al., Quantitative Finance 4 (2004); Gatheral, ibid. 10 (2010)",
+            remedy: "let orders meet what earlier ones have left, and leave time between them",
+            contains: &["linear_impact", "permanent_impact"],
+        }
+    }
+
+    fn forms(&self, _typical: &Typical) -> Vec<Form> {
+        let bps = || {
+            let bps = Parameter::new("bps_at_full_participation", "bps", 0.0).within(0.0, 100_000.0);
+            bps.starting_at(&[100.0, 1_000.0]).proportional()
+        };
+        let recovery = Parameter::new("recovery", "s", 0.0).within(0.0, 1e7);
+        let lag = Parameter::new("lag", "s", 0.0).within(0.0, 1e5).starting_at(&[0.1, 1.0, 10.0, 100.0]);
+        let exponent = Parameter::new("exponent", "", 0.0).within(0.0, 3.0).starting_at(&[0.3, 1.0]);
+        let starts = [0.1, 1.0, 10.0, 60.0, 600.0, 3600.0];
+        vec![
+            Form { name: "exponential", parameters: vec![bps(), recovery.starting_at(&starts)] },
+            Form { name: "power", parameters: vec![bps(), lag, exponent] },
+        ]
+    }
+
+    fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
+        known(self.needs(form), log)
+    }
+
+    fn memory(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
+        let kernel = |lane: usize| match form {
+            EXPONENTIAL => Propagator::exponential(thetas.row(1)[lane]),
+            _ => Propagator::power(thetas.row(1)[lane], thetas.row(2)[lane]),
+        };
+        Box::new(Decaying {
+            bps: thetas.row(0).to_vec(),
+            displaced: (0..thetas.lanes()).map(kernel).collect(),
+            last: f64::NEG_INFINITY,
+        })
+    }
+}
+
+impl Demanding for TransientImpact {
+    fn needs(&self, _form: usize) -> &'static [Need] {
+        &[Need::DailyVolume]
+    }
+}
+
+struct Decaying {
+    bps: Vec<f64>,
+    /// What is left of own impact [bps].
+    displaced: Vec<Propagator>,
+    /// When the last order met the market [s].
+    last: f64,
+}
+
+impl Law<Execution> for Decaying {
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
+        if !scene.commands.iter().any(|order| order.takes()) {
+            return;
+        }
+        // Nothing is displaced before the first order, and no order comes before one that came before it.
+        let seconds = if self.last.is_finite() { (tick.time - self.last).max(0.0) } else { 0.0 };
+        self.last = self.last.max(tick.time);
+        let lanes = self.bps.iter().zip(&mut self.displaced);
+        for (((effect, met), order), (bps, displaced)) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(lanes)
+        {
+            let own = order.side.sign() * bps * order.participation(met.volume);
+            displaced.pass(seconds);
+            effect.concession += order.side.sign() * (displaced.left() + 0.5 * own) * order.mid * 1e-4;
+            displaced.kick(own);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::LinearImpact;
+    use super::super::schedule::{Child, concessions, paid};
+    use super::*;
+    use crate::market::Role;
+
+    #[test]
+    fn children_pay_what_is_left_of_those_before_them_and_half_their_own() {
+        // 1000 bps a day's volume: 1 % moves 10 bps. After 6.93 s, ln 2 of 10 s, half of it is left.
+        let half_life = 10.0 * 2.0_f64.ln();
+        let children = [0.0, 1.0, 2.0].map(|k| Child::bought(k * half_life, 0.01));
+        let exponential = concessions(&TransientImpact, 0, &[1_000.0, 10.0], &children);
+        for (found, expected) in exponential.iter().zip([5.0, 10.0, 12.5]) {
+            assert!((found - expected).abs() < 1e-9, "{exponential:?}");
+        }
+        // A block of the three at once: half of 30 bps each. The sale at once meets all 30, and gets back half of what it moves.
+        let block = concessions(&TransientImpact, 0, &[1_000.0, 10.0], &[Child::bought(0.0, 0.03), Child::sold(0.0, 0.01)]);
+        assert!((block[0] - 15.0).abs() < 1e-9 && (block[1] + 25.0).abs() < 1e-9, "{block:?}");
+        // (1 + t)^-1/2: a quarter of the time constants at 15 s.
+        let children = [Child::bought(0.0, 0.01), Child::bought(15.0, 0.01), Child::sold(15.0 + 80.0, 0.01)];
+        let power = concessions(&TransientImpact, 1, &[1_000.0, 1.0, 0.5], &children);
+        let left = 10.0 / 96.0_f64.sqrt() + 10.0 / 81.0_f64.sqrt();
+        for (found, expected) in power.iter().zip([5.0, 10.0 / 4.0 + 5.0, 5.0 - left]) {
+            assert!((found - expected).abs() < 1e-3, "{power:?}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn an_order_long_after_the_last_meets_the_price_as_it_was() {
+        let children = [Child::bought(0.0, 0.05), Child::bought(1_000.0, 0.01)];
+        let late = concessions(&TransientImpact, 0, &[1_000.0, 10.0], &children)[1];
+        assert!((late - 5.0).abs() < 1e-9, "the price has returned: {late}");
+    }
+
+    #[test]
+    fn what_is_gone_at_once_is_half_of_linear_impact() {
+        let children = [Child::bought(0.0, 0.02), Child::bought(0.0, 0.01), Child::sold(3.0, 0.05)];
+        let gone = concessions(&TransientImpact, 0, &[1_000.0, 0.0], &children);
+        assert_eq!(gone, concessions(&LinearImpact, 0, &[500.0], &children));
+    }
+
+    #[test]
+    fn a_resting_order_neither_pays_nor_moves_the_price() {
+        let resting = Child { role: Role::Maker, ..Child::bought(1.0, 0.5) };
+        let children = [Child::bought(0.0, 0.01), resting, Child::bought(2.0, 0.01)];
+        let with = concessions(&TransientImpact, 0, &[1_000.0, 10.0], &children);
+        let without = concessions(&TransientImpact, 0, &[1_000.0, 10.0], &[children[0], children[2]]);
+        assert_eq!(with[1], 0.0);
+        assert!((with[2] - without[1]).abs() < 1e-12);
+    }
+
+    proptest! {
+        #[test]
+        fn no_round_trip_gains_and_what_is_spread_out_costs_no_more_than_the_block(
+            sizes in prop::collection::vec(-0.05..0.05_f64, 1..20), gap in 0.0..60.0_f64, form in 0..2_usize,
+        ) {
+            let theta: &[f64] = if form == 0 { &[800.0, 20.0] } else { &[800.0, 2.0, 0.4] };
+            let mut trip: Vec<Child> = sizes.iter().enumerate().map(|(k, x)| Child::signed(gap * k as f64, *x)).collect();
+            trip.push(Child::signed(gap * sizes.len() as f64, -sizes.iter().sum::<f64>()));
+            let cost = paid(&TransientImpact, form, theta, &trip);
+            prop_assert!(cost > -1e-9, "a round trip gains {}", -cost);
+            let bought: Vec<Child> = trip[..sizes.len()].iter().map(|c| Child::bought(c.time, c.size.abs())).collect();
+            let block = Child::bought(0.0, bought.iter().map(|c| c.size).sum());
+            let (parts, whole) = (paid(&TransientImpact, form, theta, &bought), paid(&TransientImpact, form, theta, &[block]));
+            prop_assert!(parts < whole + 1e-9, "{parts} in parts, {whole} at once");
+        }
+    }
+}
