@@ -13,6 +13,7 @@ mod feed;
 mod history;
 #[cfg(feature = "io")]
 mod history_file;
+pub mod indicator;
 mod instrument;
 mod ledger;
 mod log_entry;
