@@ -27,6 +27,8 @@ pub enum IndicatorError {
 }
 
 impl Period {
+    /// One input.
+    pub const ONE: Self = Self(1);
     /// The longest period.
     pub const LONGEST: usize = 1_000_000;
 
