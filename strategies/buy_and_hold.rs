@@ -20,6 +20,7 @@ pub(super) const KIND: Kind = Kind {
     about: "buys each instrument at its first price and holds it to the end",
     example: include_str!("buy_and_hold.toml"),
     parameters: &["weight"],
+    instruments: 1,
     build: |parameters| Ok(Box::new(BuyAndHold::new(read(&KIND, parameters)?)?)),
 };
 

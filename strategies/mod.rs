@@ -1,12 +1,36 @@
 //! The strategies that come with the crate: one a file, one row each in [`STRATEGIES`], with an example beside it.
 
 mod buy_and_hold;
+mod instant;
+pub mod market_making;
+mod mean_reversion;
+mod momentum;
+mod pairs;
+mod parent_order;
+mod pov;
+mod reversion;
+mod schedule;
 mod sma_cross;
+mod twap;
+mod volume_profile;
+mod vwap;
 
 pub use buy_and_hold::BuyAndHold;
+pub use instant::Instant;
+pub use mean_reversion::MeanReversion;
+pub use momentum::Momentum;
+pub use pairs::Pairs;
+pub use parent_order::ParentOrder;
+pub use pov::Pov;
+pub use reversion::{Reversion, Thresholds};
+pub use schedule::{Schedule, Slice};
 pub use sma_cross::SmaCross;
+pub use twap::Twap;
+pub use volume_profile::{PastDays, Span, VolumeProfile};
+pub use vwap::Vwap;
 
-use crate::market::Strategy;
+use crate::market::indicator::Period;
+use crate::market::{Instrument, Strategy};
 
 /// A row of the registry.
 #[derive(Debug, Clone, Copy)]
@@ -19,12 +43,23 @@ pub struct Kind {
     pub example: &'static str,
     /// Names of its parameters.
     pub parameters: &'static [&'static str],
+    /// Least number of instruments it needs.
+    pub instruments: usize,
     /// Makes one from its parameters: the `[strategy]` table without `kind`.
     pub build: fn(toml::Table) -> Result<Box<dyn Strategy>, StrategyError>,
 }
 
 /// The strategies a run can name.
-pub static STRATEGIES: &[Kind] = &[buy_and_hold::KIND, sma_cross::KIND];
+pub static STRATEGIES: &[Kind] = &[
+    buy_and_hold::KIND,
+    mean_reversion::KIND,
+    momentum::KIND,
+    pairs::KIND,
+    pov::KIND,
+    sma_cross::KIND,
+    twap::KIND,
+    vwap::KIND,
+];
 
 /// A `[strategy]` table that makes no strategy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -62,6 +97,30 @@ pub enum StrategyError {
         /// The remedy.
         hint: &'static str,
     },
+    /// An instrument the run does not have.
+    #[error("[strategy] {kind}: {parameter} names `{found}`, which the run does not have\nhint: it has {known}")]
+    Symbol {
+        /// The strategy.
+        kind: &'static str,
+        /// The parameter.
+        parameter: &'static str,
+        /// What was found.
+        found: String,
+        /// The instruments there are.
+        known: String,
+    },
+    /// A run of too few instruments.
+    #[error(
+        "[strategy] {kind} needs {needed} instruments, and the run has {found}\nhint: add an [[instrument]] and its [[data]]"
+    )]
+    TooFew {
+        /// The strategy.
+        kind: &'static str,
+        /// How many it needs.
+        needed: usize,
+        /// How many there are.
+        found: usize,
+    },
 }
 
 /// The strategy a `[strategy]` table describes.
@@ -78,6 +137,29 @@ pub fn build(table: &toml::Table) -> Result<Box<dyn Strategy>, StrategyError> {
         Some(kind) => (kind.build)(parameters),
         None => Err(StrategyError::Unknown { hint: hint(&found), found }),
     }
+}
+
+/// Holds a `[strategy]` table to the instruments of its run: those it names are there, and there are enough.
+///
+/// # Errors
+/// The first instrument that is missing. A table [`build`] refuses is not looked into.
+pub fn check_instruments(table: &toml::Table, instruments: &[Instrument]) -> Result<(), StrategyError> {
+    let name = table.get("kind").and_then(toml::Value::as_str);
+    let Some(kind) = STRATEGIES.iter().find(|kind| name == Some(kind.name)) else { return Ok(()) };
+    let names: Vec<&str> = instruments.iter().map(|instrument| instrument.symbol.as_str()).collect();
+    for parameter in ["symbol", "symbols"] {
+        let found: Vec<&str> = match table.get(parameter) {
+            Some(toml::Value::String(symbol)) => vec![symbol],
+            Some(toml::Value::Array(symbols)) => symbols.iter().filter_map(toml::Value::as_str).collect(),
+            _ => Vec::new(),
+        };
+        if let Some(found) = found.into_iter().find(|symbol| !names.contains(symbol)) {
+            let (found, known) = (found.to_owned(), names.join(", "));
+            return Err(StrategyError::Symbol { kind: kind.name, parameter, found, known });
+        }
+    }
+    let (needed, found) = (kind.instruments, instruments.len());
+    if found < needed { Err(StrategyError::TooFew { kind: kind.name, needed, found }) } else { Ok(()) }
 }
 
 fn names() -> String {
@@ -108,6 +190,22 @@ fn check_weight(kind: &Kind, weight: f64) -> Result<(), StrategyError> {
     }
     let hint = "it is the part of equity to hold, above 0; above 1 needs `max_leverage` in [run]";
     Err(StrategyError::Value { kind: kind.name, parameter: "weight", value: weight.to_string(), hint })
+}
+
+/// Holds a number of bars to what an indicator can look back on, and to `least`.
+fn check_period(kind: &Kind, parameter: &'static str, count: usize, least: usize) -> Result<Period, StrategyError> {
+    let hint = match least {
+        0 | 1 => "it is a number of bars from 1 to 1,000,000",
+        2 | 3 => "it is a number of bars from 3 to 1,000,000",
+        _ => "it is a number of bars from 4 to 1,000,000",
+    };
+    let error = StrategyError::Value { kind: kind.name, parameter, value: count.to_string(), hint };
+    Period::new(count).ok().filter(|_| count >= least).ok_or(error)
+}
+
+/// What a switch is that is on where nothing is said.
+fn yes() -> bool {
+    true
 }
 
 /// All of the equity but for a part in a hundred: what a gap at the next open, the spread and fees may take.
@@ -143,19 +241,18 @@ mod tests {
 
     #[test]
     fn a_table_that_makes_no_strategy_says_why() {
+        let there = format!("there are {}", names());
+        assert!(there.contains("`mean_reversion`, `momentum`, `pairs`, `pov`, `sma_cross`, `twap`, `vwap`"), "{there}");
         for (table, expected) in [
             (
                 "kind = 'sma_corss'\nfast = 1",
-                "[strategy] kind = \"sma_corss\" is not known\nhint: did you mean `sma_cross`?",
+                "[strategy] kind = \"sma_corss\" is not known\nhint: did you mean `sma_cross`?".to_owned(),
             ),
-            ("kind = 'moon'", "[strategy] kind = \"moon\" is not known\nhint: there are `buy_and_hold`, `sma_cross`"),
-            (
-                "fast = 1",
-                "[strategy] does not say its `kind`\nhint: add kind = \"sma_cross\"; there are `buy_and_hold`, `sma_cross`",
-            ),
+            ("kind = 'moon'", format!("[strategy] kind = \"moon\" is not known\nhint: {there}")),
+            ("fast = 1", format!("[strategy] does not say its `kind`\nhint: add kind = \"sma_cross\"; {there}")),
             (
                 "kind = 'sma_cross'\nfast = 50\nslow = 10",
-                "[strategy] sma_cross: slow is 10\nhint: `slow` must be above `fast`",
+                "[strategy] sma_cross: slow is 10\nhint: `slow` must be above `fast`".to_owned(),
             ),
         ] {
             assert_eq!(error(table), expected);

@@ -22,6 +22,7 @@ pub(super) const KIND: Kind = Kind {
     about: "long while the mean of the last `fast` closes is above that of the last `slow`, else flat or short",
     example: include_str!("sma_cross.toml"),
     parameters: &["fast", "slow", "short", "weight"],
+    instruments: 1,
     build: |parameters| Ok(Box::new(SmaCross::new(read(&KIND, parameters)?)?)),
 };
 

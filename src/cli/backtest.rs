@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::io::{InputError, OutputFolder, Overwrite, RunFile, hint_among};
-use crate::market::{Backtest, Record, RunOutputs, Session, Strategy, explained, prepare_run};
+use crate::market::{Backtest, Instrument, Record, RunOutputs, Session, Strategy, explained, prepare_run};
 use crate::report::quantity::UNDEFINED;
 use crate::strategies::{self, StrategyError};
 
@@ -74,7 +74,11 @@ impl Run {
 fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
     let mut table: toml::Table = file.strategy_settings()?;
     table.insert("kind".to_owned(), toml::Value::String(file.strategy.clone()));
-    strategies::build(&table).map_err(|error| explained_strategy(file, &error))
+    let built = strategies::build(&table).and_then(|strategy| {
+        let instruments: Vec<Instrument> = file.instruments.iter().map(Instrument::from).collect();
+        strategies::check_instruments(&table, &instruments).map(|()| strategy)
+    });
+    built.map_err(|error| explained_strategy(file, &error))
 }
 
 /// The error of a strategy at its place in the run.
@@ -84,7 +88,10 @@ fn explained_strategy(file: &RunFile, error: &StrategyError) -> InputError {
     let message = message.trim_start_matches("[strategy] ");
     match error {
         StrategyError::NoKind(_) | StrategyError::Unknown { .. } => file.error(&["strategy", "kind"], message).hint(hint),
-        StrategyError::Value { parameter, .. } => file.error(&["strategy", parameter], message).hint(hint),
+        StrategyError::TooFew { .. } => file.error(&["strategy", "kind"], message).hint(hint),
+        StrategyError::Value { parameter, .. } | StrategyError::Symbol { parameter, .. } => {
+            file.error(&["strategy", parameter], message).hint(hint)
+        }
         StrategyError::Parameter { kind, message, parameters } => {
             let word = message.split('`').nth(1).unwrap_or_default();
             let known: Vec<&str> = parameters.split(", ").collect();

@@ -16,6 +16,7 @@ mod feed;
 mod history;
 #[cfg(feature = "io")]
 mod history_file;
+pub mod indicator;
 mod instrument;
 mod known;
 mod latency;
