@@ -114,6 +114,11 @@ struct RunTable {
     strategy: StrategyKind,
     #[serde(default)]
     mechanism: Vec<MechanismEntry>,
+    /// Read by whoever knows what they mean.
+    #[serde(rename = "matching")]
+    _matching: Option<IgnoredAny>,
+    #[serde(rename = "latency")]
+    _latency: Option<IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -158,7 +163,7 @@ impl RunFile {
 
     /// The run of a document; the files it names are neither looked for nor resolved.
     fn parse(document: Document) -> Result<Self, InputError> {
-        let RunTable { run, instrument, data, strategy, mechanism } = document.parse()?;
+        let RunTable { run, instrument, data, strategy, mechanism, .. } = document.parse()?;
         if !run.cash.is_finite() || run.cash < 0.0 {
             let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
             return Err(error.found(run.cash).hint("it is what the run starts with"));
@@ -212,6 +217,22 @@ impl RunFile {
                 None => error,
             }
         })
+    }
+
+    /// `[matching]`, how orders are matched; the default where there is none.
+    ///
+    /// # Errors
+    /// Whatever `T` refuses, with line and column.
+    pub fn matching<T: DeserializeOwned + Default>(&self) -> Result<T, InputError> {
+        self.document.parse::<OnlyMatching<T>>().map(|only| only.matching)
+    }
+
+    /// `[latency]`, how long messages take; the default where there is none.
+    ///
+    /// # Errors
+    /// Whatever `T` refuses, with line and column.
+    pub fn latency<T: DeserializeOwned + Default>(&self) -> Result<T, InputError> {
+        self.document.parse::<OnlyLatency<T>>().map(|only| only.latency)
     }
 
     /// An error about the key at `keys`, such as `["strategy", "kind"]`.
@@ -294,6 +315,20 @@ fn instant<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Timestam
 #[serde(bound = "T: Deserialize<'de>")]
 struct OnlyStrategy<T> {
     strategy: Settings<T>,
+}
+
+#[derive(Deserialize)]
+#[serde(bound = "T: Deserialize<'de> + Default")]
+struct OnlyMatching<T> {
+    #[serde(default)]
+    matching: T,
+}
+
+#[derive(Deserialize)]
+#[serde(bound = "T: Deserialize<'de> + Default")]
+struct OnlyLatency<T> {
+    #[serde(default)]
+    latency: T,
 }
 
 /// A `T` read from a table without its key `kind`.

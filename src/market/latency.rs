@@ -1,10 +1,14 @@
 //! Latency: simulated time on the way of data, orders and reports.
 
+use std::fmt;
+
 use rand::Rng;
 use rand::RngExt as _;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, Exp, LogNormal};
-use serde::{Deserialize, Serialize};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::sim2real::{Seed, Timestamp};
 
@@ -134,19 +138,53 @@ pub struct Strain {
     pub per_bp_a_second: f64,
 }
 
-/// The latencies of a run.
-#[derive(Debug, Clone, PartialEq)]
+/// The latencies of a run: `[latency]`, where a number alone is a constant [s].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Latencies {
     /// From the exchange to the strategy: data. On top of the difference between a row's two times, where it has them.
+    #[serde(deserialize_with = "number_or_law")]
     pub feed: Latency,
     /// From the strategy to the exchange: orders, on top of the mechanism `command_delay`.
+    #[serde(deserialize_with = "number_or_law")]
     pub order: Latency,
     /// From the exchange to the strategy: what became of orders.
+    #[serde(deserialize_with = "number_or_law")]
     pub response: Latency,
     /// What the strategy takes to decide, before its orders leave.
+    #[serde(deserialize_with = "number_or_law")]
     pub compute: Latency,
     /// What makes all of them longer.
     pub strain: Strain,
+}
+
+/// Reads seconds, or a table of a law.
+fn number_or_law<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Latency, D::Error> {
+    struct Either;
+    impl<'de> Visitor<'de> for Either {
+        type Value = Latency;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("seconds, or a table such as { kind = \"log_normal\", median = 0.001, sigma = 0.5 }")
+        }
+
+        fn visit_f64<E: serde::de::Error>(self, seconds: f64) -> Result<Latency, E> {
+            Ok(Latency::Constant { seconds })
+        }
+
+        fn visit_i64<E: serde::de::Error>(self, seconds: i64) -> Result<Latency, E> {
+            Ok(Latency::Constant { seconds: seconds as f64 })
+        }
+
+        fn visit_u64<E: serde::de::Error>(self, seconds: u64) -> Result<Latency, E> {
+            Ok(Latency::Constant { seconds: seconds as f64 })
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Latency, A::Error> {
+            Latency::deserialize(MapAccessDeserializer::new(map))
+        }
+    }
+    deserializer.deserialize_any(Either)
 }
 
 impl Default for Latencies {

@@ -7,8 +7,8 @@ use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 
 use super::run_log::InputFile;
 use super::{
-    Backtest, BacktestError, Cash, Execution, History, Instrument, MECHANISMS, MoneyError, Provenance, Record, Reference,
-    RunOutputs, Settings, run_needs,
+    Backtest, BacktestError, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError, Provenance,
+    Record, Reference, RunOutputs, Settings, run_needs,
 };
 
 /// A backtest as a run declares it, with its data read.
@@ -49,6 +49,8 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
         seed: Seed(run.run.seed),
         max_leverage: run.run.max_leverage.unwrap_or(borrowing_nothing.max_leverage),
         reference: reference(run, &histories)?,
+        matching: run.matching::<Matching>()?,
+        latencies: run.latency::<Latencies>()?,
     };
     let provenance = Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -169,6 +171,7 @@ pub fn explained(run: &RunFile, error: &BacktestError) -> InputError {
     let keys: &[&str] = match error {
         BacktestError::Leverage(_) => &["run", "max_leverage"],
         BacktestError::ModelPrice { .. } => &["mechanism"],
+        BacktestError::Latency(_) => &["latency"],
         _ => &["run"],
     };
     split(run, keys, &error.to_string())

@@ -82,8 +82,9 @@ impl LimitFill {
     }
 }
 
-/// How orders are matched, as far as that is no mechanism.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// How orders are matched, as far as that is no mechanism: `[matching]` of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Matching {
     /// Which extreme of a bar comes first.
     pub intrabar: Intrabar,
