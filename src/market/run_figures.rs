@@ -4,7 +4,7 @@ use crate::report::quantity::{decimals, fine, number, percent, significant, span
 use crate::report::{FigureGroup, Metric};
 
 use super::RunSummary;
-use super::metric::{Drawdowns, Metrics, Returns};
+use super::metric::{Metrics, Returns};
 
 /// The figures that come first.
 pub(super) fn key_figures(summary: &RunSummary) -> Vec<Metric> {
@@ -151,14 +151,10 @@ impl Told<'_> {
 
     fn of_risk(&self) -> Vec<Metric> {
         let (m, returns) = (self.metrics(), &self.metrics().returns);
-        let falls = format!(
-            "From a high to its recovery, or to the end; of {} the deepest have their dates above.",
-            Drawdowns::KEPT
-        );
         vec![
             self.volatility(),
             self.max_drawdown(),
-            figure("Longest under water", m.longest_under_water.map(span), falls),
+            figure("Longest under water", m.longest_under_water.map(span), "From a high to its recovery, or to the end."),
             figure("Ulcer index", m.ulcer_index.map(fine), "Root mean square of the drawdowns at the ends of days."),
             figure("Value at risk", returns.value_at_risk_95.map(fine), "A day's loss that 95 % of days do not exceed."),
             figure("Expected shortfall", returns.expected_shortfall_95.map(fine), "Mean loss of the worst 5 % of days."),

@@ -38,7 +38,9 @@ pub(super) fn run_page(summary: &RunSummary, backtest: &Backtest, record: &Recor
 /// What was traded, when, and how it went, in one sentence.
 fn title(summary: &RunSummary, backtest: &Backtest, record: &Record) -> String {
     let symbols: Vec<&str> = backtest.instruments().iter().map(|i| i.symbol.as_str()).collect();
-    let day = |time: Timestamp| DateTime::from_timestamp_nanos(time.0).format("%-d %B %Y").to_string();
+    // What is known at midnight belongs to the day that ends with it.
+    let known = |time: Timestamp| DateTime::from_timestamp_nanos(time.0.saturating_sub(1));
+    let day = |time: Timestamp| known(time).with_timezone(&summary.provenance.zone).format("%-d %B %Y").to_string();
     let span = match (record.equity.first(), record.equity.last()) {
         (Some(first), Some(last)) if day(first.time) == day(last.time) => format!(", {}", day(first.time)),
         (Some(first), Some(last)) => format!(", {} to {}", day(first.time), day(last.time)),

@@ -6,7 +6,7 @@ use crate::report::backtest::BacktestPage;
 use crate::report::quantity::{fine, span};
 use crate::report::section::{ReportError, Section, fill};
 
-use super::round_trips::Dates;
+use super::dates::Dates;
 
 pub(in crate::report) struct Drawdowns<'a> {
     pub page: &'a BacktestPage,
@@ -18,14 +18,14 @@ impl Section for Drawdowns<'_> {
     }
 
     fn title(&self) -> &'static str {
-        "The deepest drawdowns"
+        "Drawdowns"
     }
 
     fn render(&self) -> Result<String, ReportError> {
         if self.page.drawdowns.is_empty() {
             return Ok(String::new());
         }
-        let dates = Dates::over(&self.page.time);
+        let dates = Dates::over(self.page);
         let rows: Vec<Value> = self
             .page
             .drawdowns
@@ -33,13 +33,13 @@ impl Section for Drawdowns<'_> {
             .map(|fall| {
                 context! {
                     depth => fine(fall.depth),
-                    peak => dates.text(fall.peak_at),
-                    trough => dates.text(fall.trough_at),
-                    recovered => fall.recovered_at.map(|at| dates.text(at)),
+                    peak => dates.known(fall.peak_at),
+                    trough => dates.known(fall.trough_at),
+                    recovered => fall.recovered_at.map(|at| dates.known(at)),
                     length => span(fall.seconds),
                 }
             })
             .collect();
-        fill("drawdowns.html", include_str!("../templates/drawdowns.html"), context! { rows => rows })
+        fill("drawdowns.html", include_str!("../templates/drawdowns.html"), context! { rows => rows, zone => dates.zone() })
     }
 }

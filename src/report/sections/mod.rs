@@ -6,6 +6,7 @@ mod assumptions;
 mod checks;
 mod confusion;
 mod costs;
+mod dates;
 mod drawdowns;
 mod effects;
 mod equity;

@@ -19,7 +19,7 @@ impl Section for Months<'_> {
     }
 
     fn title(&self) -> &'static str {
-        "Month by month"
+        "Months"
     }
 
     fn render(&self) -> Result<String, ReportError> {

@@ -1,12 +1,12 @@
 //! Round trips: those that gained and lost most, the first and the last.
 
-use chrono::DateTime;
 use minijinja::{Value, context};
 
 use crate::report::backtest::{BacktestPage, Trade};
 use crate::report::quantity::{UNDEFINED, decimals, fine, span};
 use crate::report::section::{ReportError, Section, fill};
 
+use super::dates::Dates;
 use super::fills::{exact, price};
 
 pub(in crate::report) struct RoundTrips<'a> {
@@ -34,7 +34,7 @@ impl Section for RoundTrips<'_> {
         if trades.is_empty() {
             return Ok(String::new());
         }
-        let dates = Dates::over(&self.page.time);
+        let dates = Dates::over(self.page);
         let mut tables = Vec::new();
         let mut table = |title: String, of: &[&Trade], open: bool| {
             let rows: Vec<Value> = of.iter().map(|trade| row(trade, dates)).collect();
@@ -60,6 +60,7 @@ impl Section for RoundTrips<'_> {
             context! {
                 tables => tables,
                 currency => &self.page.currency,
+                zone => dates.zone(),
                 count => decimals(trades.len() as f64, 0),
                 cut => trades.len() > ALL,
             },
@@ -80,33 +81,5 @@ fn row(trade: &Trade, dates: Dates) -> Value {
         fees => decimals(trade.fees, 2),
         net => decimals(trade.net, 2),
         growth => trade.growth.map_or_else(|| UNDEFINED.to_owned(), fine),
-    }
-}
-
-/// How exactly instants are told.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Dates {
-    /// By their day.
-    Days,
-    /// To the minute.
-    Minutes,
-}
-
-impl Dates {
-    /// As exact as a run asks for whose events were at `time` [ns since the Unix epoch, UTC]: by the day where there was
-    /// about one event a day.
-    pub fn over(time: &[i64]) -> Self {
-        let (Some(first), Some(last)) = (time.first(), time.last()) else { return Self::Minutes };
-        let days = last.saturating_sub(*first) / 86_400_000_000_000;
-        if time.len() as i64 <= days + 1 { Self::Days } else { Self::Minutes }
-    }
-
-    /// An instant [ns since the Unix epoch, UTC].
-    pub fn text(self, time: i64) -> String {
-        let format = match self {
-            Self::Days => "%Y-%m-%d",
-            Self::Minutes => "%Y-%m-%d %H:%M",
-        };
-        DateTime::from_timestamp_nanos(time).format(format).to_string()
     }
 }
