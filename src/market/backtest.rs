@@ -62,6 +62,9 @@ pub enum BacktestError {
     /// A leverage that cannot be.
     #[error("max_leverage is {0}\nhint: it is a number above 0; 1 borrows nothing")]
     Leverage(f64),
+    /// A model of queues that cannot be.
+    #[error("the queue is to move by {0}\nhint: the exponent is a number above 0; 1 is in proportion")]
+    Queue(QueueModel),
     /// A latency that cannot be.
     #[error(transparent)]
     Latency(#[from] LatencyError),
@@ -146,6 +149,9 @@ impl Backtest {
         }
         let Latencies { feed, order, response, compute, .. } = &settings.latencies;
         [feed, order, response, compute].into_iter().try_for_each(|latency| latency.check())?;
+        if !settings.matching.queue.is_possible() {
+            return Err(BacktestError::Queue(settings.matching.queue));
+        }
         let increments = instruments
             .iter()
             .map(|i| Increments::of(i).map_err(|error| BacktestError::Money { place: i.symbol.clone(), error }))

@@ -95,6 +95,16 @@ impl History {
             && self.orders.is_empty()
     }
 
+    /// Whether bars are all that is known.
+    #[must_use]
+    pub fn shows_bars_alone(&self) -> bool {
+        !self.bars.is_empty()
+            && self.quotes.is_empty()
+            && self.prints.is_empty()
+            && self.depth.is_empty()
+            && self.orders.is_empty()
+    }
+
     /// Its bars alone, oldest first.
     #[must_use]
     pub fn into_bars(self) -> Vec<Bar> {

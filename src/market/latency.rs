@@ -62,6 +62,18 @@ pub struct LatencyError {
     hint: &'static str,
 }
 
+impl fmt::Display for Latency {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Constant { seconds } => write!(f, "{seconds} s"),
+            Self::Uniform { least, most } => write!(f, "{least} to {most} s, evenly"),
+            Self::Exponential { least, mean } => write!(f, "{least} s, and beyond that exponential with a mean of {mean} s"),
+            Self::LogNormal { median, sigma } => write!(f, "log-normal with a median of {median} s and a sigma of {sigma}"),
+            Self::Measured { seconds } => write!(f, "one of {} that were measured", seconds.len()),
+        }
+    }
+}
+
 impl Latency {
     /// No latency.
     pub const NONE: Self = Self::Constant { seconds: 0.0 };

@@ -172,6 +172,7 @@ pub fn explained(run: &RunFile, error: &BacktestError) -> InputError {
         BacktestError::Leverage(_) => &["run", "max_leverage"],
         BacktestError::ModelPrice { .. } => &["mechanism"],
         BacktestError::Latency(_) => &["latency"],
+        BacktestError::Queue(_) => &["matching", "queue"],
         _ => &["run"],
     };
     split(run, keys, &error.to_string())

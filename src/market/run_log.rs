@@ -8,7 +8,7 @@ use crate::report::{BacktestPage, ReportError};
 
 use super::metric::{Counts, InstrumentSummary, Metrics, RoundTrip};
 use super::run_page::run_page;
-use super::{Backtest, Instrument, MoneyError, Record, Reference};
+use super::{Backtest, Instrument, MoneyError, Price, Record, Reference};
 
 /// A file a run depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -183,7 +183,8 @@ fn trades_table(trips: &[RoundTrip], instruments: &[Instrument]) -> OutputTable 
 
 impl Record {
     /// `orders`: `order_id, symbol, decided_at, side, qty, type, limit_price, submitted_at, strategy, seen_bid, seen_ask`,
-    /// and beyond the contract's columns `status, filled_qty`. Orders that were refused were never sent and are not here.
+    /// and beyond the contract's columns `status, filled_qty, stop_price, time_in_force, arrives_at, reason`. Orders that were
+    /// refused before they were sent are not here.
     #[must_use]
     pub fn orders_table(&self, instruments: &[Instrument], strategy: &str) -> OutputTable {
         let orders = &self.blotter.orders;
@@ -194,28 +195,46 @@ impl Record {
             .times("decided_at", orders.iter().map(|o| o.decided_at))
             .texts("side", orders.iter().map(|o| o.side.word().to_owned()))
             .floats("qty", orders.iter().map(|o| o.quantity.to_f64()))
-            .texts("type", orders.iter().map(|_| "market".to_owned()))
-            .floats("limit_price", orders.iter().map(|_| None::<f64>))
+            .texts("type", orders.iter().map(|o| o.kind.word().to_owned()))
+            .floats("limit_price", orders.iter().map(|o| o.kind.limit().map(Price::to_f64)))
             .times("submitted_at", orders.iter().map(|o| o.decided_at))
             .texts("strategy", orders.iter().map(|_| strategy.to_owned()))
             .floats("seen_bid", orders.iter().map(|o| o.seen_bid))
             .floats("seen_ask", orders.iter().map(|o| o.seen_ask))
             .texts("status", orders.iter().map(|o| o.status.word().to_owned()))
             .floats("filled_qty", orders.iter().map(|o| o.filled.to_f64()))
+            .floats("stop_price", orders.iter().map(|o| o.kind.trigger().map(Price::to_f64)))
+            .texts("time_in_force", orders.iter().map(|o| o.time_in_force.word().to_owned()))
+            .times("arrives_at", orders.iter().map(|o| o.arrives_at))
+            .texts("reason", orders.iter().map(|o| o.reason.map(|reason| reason.word().to_owned())))
     }
 
-    /// `fills`: `order_id, filled_at, qty, price, fee, liquidity, fill_id`.
+    /// `fills`: `order_id, filled_at, qty, price, fee, liquidity, fill_id`, and beyond the contract's columns why it was filled
+    /// then and at that price: `data` (what brought it about) and `data_row` (which row of these, from 0), `met` (open or mid it met),
+    /// `band_low` and `band_high` (what the data show for that time), `queued_behind` (units ahead when it joined the queue), and
+    /// `added_by_X`, what mechanism X added to the price, against the order positive.
     #[must_use]
     pub fn fills_table(&self) -> OutputTable {
         let fills = &self.blotter.fills;
-        OutputTable::new()
+        let table = OutputTable::new()
             .integers("order_id", fills.iter().map(|f| f.order_id as i64))
             .times("filled_at", fills.iter().map(|f| f.filled_at))
             .floats("qty", fills.iter().map(|f| f.quantity.to_f64()))
             .floats("price", fills.iter().map(|f| f.price.to_f64()))
             .floats("fee", fills.iter().map(|f| f.fee.to_f64()))
-            .texts("liquidity", fills.iter().map(|_| "taker".to_owned()))
+            .texts("liquidity", fills.iter().map(|f| f.why.role.word().to_owned()))
             .integers("fill_id", fills.iter().map(|f| f.fill_id as i64))
+            .texts("data", fills.iter().map(|f| f.why.data.word().to_owned()))
+            .integers("data_row", fills.iter().map(|f| f.why.row as i64))
+            .floats("met", fills.iter().map(|f| f.why.met))
+            .floats("band_low", fills.iter().map(|f| f.why.band[0].to_f64()))
+            .floats("band_high", fills.iter().map(|f| f.why.band[1].to_f64()))
+            .floats("queued_behind", fills.iter().map(|f| Some(f.why.queued_behind).filter(|size| size.is_finite())));
+        let blotter = &self.blotter;
+        blotter.conceding.iter().enumerate().fold(table, |table, (k, mechanism)| {
+            let added = blotter.terms.iter().skip(k).step_by(blotter.conceding.len().max(1)).copied();
+            table.floats(&format!("added_by_{mechanism}"), added)
+        })
     }
 
     /// `equity`: `ts, equity`, one row an event.

@@ -136,6 +136,38 @@ fn costs(metrics: &Metrics) -> Vec<Cost> {
     kinds.into_iter().map(|(kind, amount)| Cost { kind: kind.to_owned(), amount, bps: bps(amount) }).collect()
 }
 
+/// How orders that wait were matched, and how long messages took: where it can have mattered.
+fn matched(summary: &RunSummary, backtest: &Backtest) -> Vec<(&'static str, String)> {
+    let settings = backtest.settings();
+    let (matching, latencies) = (settings.matching, &settings.latencies);
+    let mut all = Vec::new();
+    if summary.counts.resting > 0 {
+        let by_bars = backtest.histories().iter().any(|history| history.shows_bars_alone());
+        if by_bars {
+            let count = match summary.counts.ambiguous_bars {
+                0 => "in no bar did it decide what was filled".to_owned(),
+                1 => "in 1 bar orders waited on both sides of the open, and it decided".to_owned(),
+                n => format!("in {n} bars orders waited on both sides of the open, and it decided"),
+            };
+            all.push(("way within a bar", format!("{}; {count}", matching.intrabar.word())));
+            all.push(("limit orders", format!("filled {}, at the limit", matching.limit_fill.word())));
+        } else {
+            all.push(("queue at a price", matching.queue.to_string()));
+        }
+    }
+    for (name, latency) in [
+        ("latency of data", &latencies.feed),
+        ("latency of orders", &latencies.order),
+        ("latency of reports", &latencies.response),
+        ("time to decide", &latencies.compute),
+    ] {
+        if !latency.is_none() {
+            all.push((name, latency.to_string()));
+        }
+    }
+    all
+}
+
 fn in_force(summary: &RunSummary, backtest: &Backtest) -> Vec<InForce> {
     let venue = backtest.venue();
     let currency = &summary.provenance.currency;
@@ -162,7 +194,8 @@ fn in_force(summary: &RunSummary, backtest: &Backtest) -> Vec<InForce> {
         _ => format!("{from_quotes}; without quotes at the open of the next bar"),
     };
     let assumption = |name: &str, setting: String| InForce { name: name.to_owned(), setting };
-    all.push(assumption("fills", fills));
+    all.push(assumption("market orders", fills));
+    all.extend(matched(summary, backtest).into_iter().map(|(name, setting)| assumption(name, setting)));
     all.push(assumption("largest leverage", format!("{} times the equity", number(backtest.settings().max_leverage))));
     all.push(assumption("market", "the past does not react to what the backtest trades".to_owned()));
     match summary.metrics.returns.gaps {

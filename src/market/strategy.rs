@@ -23,6 +23,20 @@ pub enum EventKind {
     Timer,
 }
 
+impl EventKind {
+    /// Its word in tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Bar => "bar",
+            Self::Trade => "trade",
+            Self::Depth => "depth",
+            Self::Quote => "quote",
+            Self::Timer => "timer",
+        }
+    }
+}
+
 /// Something that became known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Event {

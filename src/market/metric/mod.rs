@@ -83,11 +83,19 @@ pub struct Counts {
     pub filled: usize,
     /// Orders of which some was cancelled, because there was no volume for it.
     pub cancelled: usize,
-    /// Orders that had met no market when the data ended.
+    /// Orders that were under way when the data ended.
     pub unfilled: usize,
+    /// Orders the venue refused: post-only ones that would have taken, those to be filled whole that could not be.
+    pub refused_by_venue: usize,
+    /// Orders whose time was over before they were filled whole.
+    pub expired: usize,
+    /// Orders that waited for a price.
+    pub resting: usize,
+    /// Bars within which orders waited on both sides of the open, so that a rule decided which was met first.
+    pub ambiguous_bars: usize,
     /// Fills.
     pub fills: usize,
-    /// Orders refused, by reason.
+    /// Orders refused before they were sent, by reason.
     pub rejected: std::collections::BTreeMap<super::Reason, usize>,
 }
 
@@ -102,6 +110,10 @@ impl Counts {
             filled: blotter.count(Status::Filled),
             cancelled: blotter.count(Status::Cancelled),
             unfilled: blotter.count(Status::Unfilled),
+            refused_by_venue: blotter.count(Status::Rejected),
+            expired: blotter.count(Status::Expired),
+            resting: blotter.orders.iter().filter(|order| order.kind != super::OrderKind::Market).count(),
+            ambiguous_bars: record.held.ambiguous_bars,
             fills: blotter.fills.len(),
             rejected: blotter.rejected.clone(),
         }

@@ -1,5 +1,7 @@
 //! Where a resting order stands in the queue at its price, as far as the data let one know.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 /// How a queue is thought to move where the data say only how much is displayed at a price, and not whose it is.
@@ -27,7 +29,29 @@ pub enum QueueModel {
     },
 }
 
+impl fmt::Display for QueueModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Trades => f.write_str("trades alone bring an order forward"),
+            Self::Proportional => f.write_str("cancellations ahead and behind in proportion to what is there"),
+            Self::Log => f.write_str("cancellations ahead and behind by the logarithms of what is there"),
+            Self::Power { exponent } => {
+                write!(f, "cancellations ahead and behind by what is there to the power of {exponent}")
+            }
+        }
+    }
+}
+
 impl QueueModel {
+    /// Holds its parameters to what they can be: whether it can be used.
+    #[must_use]
+    pub fn is_possible(self) -> bool {
+        match self {
+            Self::Power { exponent } => exponent.is_finite() && exponent > 0.0,
+            _ => true,
+        }
+    }
+
     /// The part of what was cancelled that stood behind, with `ahead` and `behind` [units].
     fn from_behind(self, ahead: f64, behind: f64) -> f64 {
         let of = |f: fn(f64, f64) -> f64, n: f64| {
