@@ -38,7 +38,7 @@ pub struct Parameters {
     pub lookback: usize,
     /// Number of bars from one rebalancing to the next.
     pub rebalance: usize,
-    /// Standard deviation of an instrument's return in a year that its position is to have [fraction of its share of equity].
+    /// Standard deviation that a position's return in a year is to have [fraction of its instrument's share of equity].
     pub volatility: f64,
     /// How many bars back the weights of the volatility have their centre of mass.
     pub volatility_bars: usize,

@@ -93,8 +93,8 @@ impl Pairs {
     /// A strategy with the given parameters.
     ///
     /// # Errors
-    /// If not 4 <= window <= 1,000,000, or 0 <= exit < entry < stop; if the two symbols are one; or if the hedge ratio or the
-    /// weight is not above 0.
+    /// If not 4 <= window <= 1,000,000, or 0 <= exit < entry < stop; if the two symbols are one; or if the hedge ratio or
+    /// the weight is not above 0.
     pub fn new(parameters: Parameters) -> Result<Self, StrategyError> {
         let value = |parameter, value: String, hint| Err(StrategyError::Value { kind: KIND.name, parameter, value, hint });
         let period = check_period(&KIND, "window", parameters.window, 4)?;

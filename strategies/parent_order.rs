@@ -22,7 +22,8 @@ pub struct ParentOrder {
 }
 
 impl ParentOrder {
-    /// `quantity` [units] of the instrument called `symbol`, or of each of the run where none is named, from `start` to `end`.
+    /// `quantity` [units] of the instrument called `symbol`, or of each of the run where none is named, from a start to an
+    /// end.
     ///
     /// # Errors
     /// If `side` is neither buy nor sell, the quantity is not above 0, or the end is not after the start.
@@ -125,7 +126,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_share_never_exceeds_the_parent(quantity in 1_i64..i64::MAX, share in 0.0..2.0_f64, lot in 1_i64..1_000_000_000) {
+        fn a_share_never_exceeds_the_parent(
+            quantity in 1_i64..i64::MAX,
+            share in 0.0..2.0_f64,
+            lot in 1_i64..1_000_000_000,
+        ) {
             let steps = lots_of(lot as f64 * 1e-9);
             let found = due(Quantity(quantity), share, steps);
             prop_assert!(found >= Quantity::ZERO && found.0 <= quantity && steps.holds(found));

@@ -10,8 +10,8 @@ use super::{Instant, Kind, ParentOrder, Schedule, StrategyError, read};
 /// average. The first event in a slice brings its part, and what is missing of those before. What is missing at the end is
 /// sent then, and again once an interval until all is filled.
 ///
-/// The reference against which D. Bertsimas and A. W. Lo, "Optimal control of execution costs", Journal of Financial Markets 1
-/// (1998), find nothing better where prices are a random walk and impact is linear.
+/// D. Bertsimas and A. W. Lo, "Optimal control of execution costs", Journal of Financial Markets 1 (1998), find that nothing
+/// costs less where prices are a random walk and impact is linear and stays.
 #[derive(Debug, Clone)]
 pub struct Twap {
     parent: ParentOrder,

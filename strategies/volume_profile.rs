@@ -70,9 +70,9 @@ impl PastDays {
         Self { zone, bucket, most, days: VecDeque::new() }
     }
 
-    /// Counts a bar to the part of the day in which it began.
+    /// Counts a bar to the day in which it began, its volume spread evenly from its beginning to its end.
     pub fn see(&mut self, bar: &Bar) {
-        let (date, second) = local(bar.open_at, self.zone);
+        let (date, from) = local(bar.open_at, self.zone);
         if self.days.back().is_none_or(|(last, _)| *last < date) {
             // One more than is asked for: the newest may not have ended.
             let spare = if self.days.len() > self.most { self.days.pop_front() } else { None };
@@ -81,10 +81,18 @@ impl PastDays {
             volumes.resize((DAY / self.bucket).ceil() as usize, 0.0);
             self.days.push_back((date, volumes));
         }
-        if let Some((_, volumes)) = self.days.back_mut()
-            && let Some(volume) = volumes.get_mut((second / self.bucket) as usize)
-        {
-            *volume += bar.volume;
+        // What of it lies beyond midnight is left to the last part of the day.
+        let to = from + bar.known_at.seconds_since(bar.open_at).max(1e-9);
+        let Some((_, volumes)) = self.days.back_mut() else { return };
+        let last = volumes.len().saturating_sub(1);
+        let first = ((from / self.bucket) as usize).min(last);
+        for (k, volume) in volumes.iter_mut().enumerate().skip(first) {
+            let ends = if k == last { to } else { ((k + 1) as f64 * self.bucket).min(to) };
+            let begins = (k as f64 * self.bucket).max(from);
+            *volume += bar.volume * (ends - begins).max(0.0) / (to - from);
+            if ends >= to {
+                break;
+            }
         }
     }
 
@@ -134,5 +142,13 @@ mod tests {
             [Span { from: 32_400.0, to: 36_000.0, weight: 6.0 }, Span { from: 36_000.0, to: 39_600.0, weight: 10.0 }];
         assert_eq!(past.profile_before(date(3)).spans, expected);
         assert_eq!(past.profile_before(date(1)).spans, []);
+        // A bar of three hours from half past nine, and one that goes on beyond midnight.
+        let mut past = PastDays::new(Tz::UTC, 3_600.0, 1);
+        for (at, halves, volume) in [(19, 6, 60.0), (46, 8, 40.0)] {
+            let known_at = Timestamp((at + halves) * hour / 2);
+            past.see(&Bar { known_at, ..bar(at * hour / 2, volume) });
+        }
+        let found: Vec<f64> = past.profile_before(date(1)).spans.iter().map(|span| span.weight).collect();
+        assert_eq!(found, [10.0, 20.0, 20.0, 10.0, 40.0]);
     }
 }

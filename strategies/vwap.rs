@@ -103,8 +103,8 @@ impl Vwap {
     /// A strategy with the given parameters.
     ///
     /// # Errors
-    /// If the side is none, the quantity is not above 0, the end not after the start or on another day, the zone unknown, the
-    /// interval or the number of days cannot be, or the profile is out of order or has no volume between start and end.
+    /// If the side is none, the quantity is not above 0, the end not after the start or on another day, the zone unknown,
+    /// the interval or the number of days cannot be, or the profile is out of order or has no volume between start and end.
     pub fn new(parameters: &Parameters) -> Result<Self, StrategyError> {
         let Parameters { symbol, side, quantity, start, end, interval, zone, days, profile } = parameters;
         let value = |parameter, value: String, hint| StrategyError::Value { kind: KIND.name, parameter, value, hint };

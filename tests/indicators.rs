@@ -91,7 +91,12 @@ proptest! {
     }
 
     #[test]
-    fn bands_and_convergence_are_those_of_ta_lib(bars in walk(), n in 2_usize..30, more in 1_usize..20, signal in 1_usize..12) {
+    fn bands_and_convergence_are_those_of_ta_lib(
+        bars in walk(),
+        n in 2_usize..30,
+        more in 1_usize..20,
+        signal in 1_usize..12,
+    ) {
         let (core, closes, end) = (Core::new(), closes(&bars), LENGTH - 1);
         let [mut a, mut b, mut c] = [0; 3].map(|_| vec![0.0; LENGTH]);
         let range = core.bbands(0, end, &closes, n as i32, 2.0, 2.0, MAType::SMA, &mut a, &mut b, &mut c).unwrap();

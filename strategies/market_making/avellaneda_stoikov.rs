@@ -9,8 +9,8 @@ use crate::strategies::{Kind, StrategyError};
 ///
 /// The mid `s` is taken to move as `sigma` times a Brownian motion, and an order `d` away from it to be filled at a rate of
 /// `A exp(-kappa d)`. With `q` units held and `T - t` left, one more unit is worth the **reservation price**
-/// `r = s - q gamma sigma^2 (T - t)`, and the best quotes lie `gamma sigma^2 (T - t) + (2 / gamma) ln(1 + gamma / kappa)` apart
-/// about it (the paper's first-order approximation, equations 29 and 30).
+/// `r = s - q gamma sigma^2 (T - t)`, and the best quotes lie about it, `gamma sigma^2 (T - t) + (2 / gamma) ln(1 + gamma /
+/// kappa)` apart: the paper's approximation to the first order in q.
 ///
 /// The formula lets the inventory grow without bounds; here the side that would add to it is not quoted from
 /// `max_inventory` on, as in O. Gueant, C.-A. Lehalle and J. Fernandez-Tapia, "Dealing with the inventory risk", Mathematics

@@ -121,7 +121,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn sums_and_products_are_those_of_integers(terms in prop::collection::vec((-(1_i64 << 50)..1 << 50, -(1_i64 << 50)..1 << 50), 1..50)) {
+        fn sums_and_products_are_those_of_integers(
+            terms in prop::collection::vec((-(1_i64 << 50)..1 << 50, -(1_i64 << 50)..1 << 50), 1..50),
+        ) {
             let mut sum = DoubleDouble::ZERO;
             let mut exact = 0_i128;
             for (a, b) in terms {
