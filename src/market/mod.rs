@@ -4,6 +4,7 @@ mod backtest;
 mod bar;
 mod blotter;
 mod book;
+mod calendar;
 mod check;
 mod covariate;
 mod daily;
@@ -47,6 +48,9 @@ pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings}
 pub use bar::Bar;
 pub use blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
 pub use book::{Book, Level, Walk};
+pub use calendar::{
+    Calendar, CalendarError, CalendarFault, CalendarTable, Day, Hours, LocalTime, Observed, OccasionRow, SessionRow, Trading,
+};
 pub use check::{check_strategy, check_strategy_on};
 pub use daily::Daily;
 pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
