@@ -58,7 +58,10 @@ pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
 pub use feed::Feed;
 pub use history::{History, HistoryError};
 pub use instrument::Instrument;
-pub use ledger::{Ledger, Position, Trade};
+pub use ledger::{
+    Balance, ChargeKind, Charges, Closing, Conversion, Dividend, Fraction, Income, Ledger, LedgerError, Margin, Multiplier,
+    Position, Requirement, Split, Terms, Trade,
+};
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
 #[cfg(feature = "io")]
 pub use log_folder::{LogSettings, read_log};
