@@ -5,6 +5,7 @@ mod backtest;
 mod bar;
 mod blotter;
 mod book;
+mod calendar;
 mod check;
 mod covariate;
 mod daily;
@@ -59,6 +60,9 @@ pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings}
 pub use bar::Bar;
 pub use blotter::{Blotter, Fill, FillCost, Order, Rejection, Status, Why};
 pub use book::{Book, Level, Walk};
+pub use calendar::{
+    Calendar, CalendarError, CalendarFault, CalendarTable, Day, Hours, LocalTime, Observed, OccasionRow, SessionRow, Trading,
+};
 pub use check::{check_strategy, check_strategy_on};
 pub use daily::Daily;
 pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
@@ -69,7 +73,10 @@ pub use history::{History, HistoryError};
 pub use instrument::Instrument;
 pub use known::OpenOrder;
 pub use latency::{Latencies, Latency, LatencyError, Strain};
-pub use ledger::{Ledger, Position, Trade};
+pub use ledger::{
+    Balance, ChargeKind, Charges, Closing, Conversion, Dividend, Fraction, Income, Ledger, LedgerError, Margin, Multiplier,
+    Position, Requirement, Split, Terms, Trade,
+};
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
 #[cfg(feature = "io")]
 pub use log_folder::{LogSettings, read_log};

@@ -49,6 +49,12 @@ pub enum MoneyError {
         /// What was found.
         value: f64,
     },
+    /// Cash or positions in a currency whose rate to the base currency is not known yet.
+    #[error("currency {currency} has no rate to the base currency\nhint: set its rate before the first trade in it")]
+    NoRate {
+        /// Number of the currency.
+        currency: usize,
+    },
     /// A sum of cash that 128 bits do not hold.
     #[error("an amount of cash is beyond 1.7e20\nhint: trade smaller quantities")]
     Overflow,
