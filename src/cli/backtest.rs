@@ -71,7 +71,7 @@ impl Run {
 }
 
 /// The strategy of `file`.
-fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
+pub(super) fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
     let mut table: toml::Table = file.strategy_settings()?;
     table.insert("kind".to_owned(), toml::Value::String(file.strategy.clone()));
     strategies::build(&table).map_err(|error| explained_strategy(file, &error))

@@ -1,5 +1,6 @@
 //! Markets: what is traded, the backtest that trades it, and `execution`, the plant every order meets.
 
+mod audit;
 mod backtest;
 mod bar;
 mod blotter;
@@ -43,6 +44,9 @@ mod tape_file;
 mod twin;
 mod venue;
 
+pub use audit::{
+    Audit, AuditSettings, AuditVerdict, Change, Cut, Difference, Engine, FillFault, Impossible, KnownEarly, Subject, audit, audit_engine,
+};
 pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 pub use bar::Bar;
 pub use blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
