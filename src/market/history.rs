@@ -1,15 +1,17 @@
 //! What is known of one instrument's market over time.
 
+use std::sync::Arc;
+
 use crate::sim2real::Timestamp;
 
 use super::{Bar, Price, Quotes};
 
 /// Bars and quotes of one instrument, in the order in which they could be known. It was made by its own checks, so that
-/// what reads it need not check again.
+/// what reads it need not check again. A clone shares them: many runs on the same data hold them once.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct History {
-    bars: Vec<Bar>,
-    quotes: Quotes,
+    bars: Arc<Vec<Bar>>,
+    quotes: Arc<Quotes>,
 }
 
 /// A history that cannot be.
@@ -73,7 +75,7 @@ impl History {
     pub fn new(bars: Vec<Bar>, quotes: Quotes) -> Result<Self, HistoryError> {
         check_bars(&bars)?;
         check_quotes(&quotes)?;
-        Ok(Self { bars, quotes })
+        Ok(Self { bars: Arc::new(bars), quotes: Arc::new(quotes) })
     }
 
     /// Its bars, oldest first.
@@ -85,7 +87,7 @@ impl History {
     /// Its bars alone, oldest first.
     #[must_use]
     pub fn into_bars(self) -> Vec<Bar> {
-        self.bars
+        Arc::unwrap_or_clone(self.bars)
     }
 
     /// Its quotes, oldest first.
@@ -110,7 +112,7 @@ impl History {
         for quote in (from..all.len()).map_while(|k| all.get(k)).take_while(|quote| quote.time <= end) {
             quotes.push(quote.time, quote.bids, quote.asks);
         }
-        Self { bars, quotes }
+        Self { bars: Arc::new(bars), quotes: Arc::new(quotes) }
     }
 }
 
