@@ -72,13 +72,18 @@ impl Run {
 
 /// The strategy of `file`.
 pub(super) fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
+    strategies::build(&strategy_table(file)?).map_err(|error| explained_strategy(file, &error))
+}
+
+/// `[strategy]` of `file`, its `kind` with it.
+pub(super) fn strategy_table(file: &RunFile) -> Result<toml::Table, InputError> {
     let mut table: toml::Table = file.strategy_settings()?;
     table.insert("kind".to_owned(), toml::Value::String(file.strategy.clone()));
-    strategies::build(&table).map_err(|error| explained_strategy(file, &error))
+    Ok(table)
 }
 
 /// The error of a strategy at its place in the run.
-fn explained_strategy(file: &RunFile, error: &StrategyError) -> InputError {
+pub(super) fn explained_strategy(file: &RunFile, error: &StrategyError) -> InputError {
     let text = error.to_string();
     let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
     let message = message.trim_start_matches("[strategy] ");

@@ -16,6 +16,8 @@ mod mechanisms;
 mod prove;
 mod screen;
 mod stop;
+mod sweep;
+mod walk_forward;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -54,6 +56,8 @@ enum Command {
     Calibrate(calibrate::Calibrate),
     Backtest(backtest::Run),
     Audit(audit::Look),
+    Sweep(sweep::Try),
+    WalkForward(walk_forward::Walk),
     Mechanisms(mechanisms::Mechanisms),
     Prove(prove::Prove),
     Data(data::Data),
@@ -95,6 +99,8 @@ impl Command {
             Self::Calibrate(command) => command.run(screen),
             Self::Backtest(command) => command.run(screen),
             Self::Audit(command) => command.run(screen),
+            Self::Sweep(command) => command.run(screen),
+            Self::WalkForward(command) => command.run(screen),
             Self::Mechanisms(command) => command.run(screen),
             Self::Prove(command) => command.run(screen),
             Self::Data(command) => command.run(screen),

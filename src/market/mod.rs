@@ -37,12 +37,16 @@ mod run_needs;
 mod run_page;
 mod session;
 mod strategy;
+#[cfg(feature = "io")]
+pub mod sweep;
 mod tape;
 #[cfg(feature = "io")]
 mod tape_file;
 #[cfg(feature = "io")]
 mod twin;
 mod venue;
+#[cfg(feature = "io")]
+pub mod walk_forward;
 
 pub use audit::{
     Audit, AuditSettings, AuditVerdict, Change, Cut, Difference, Engine, FillFault, Impossible, KnownEarly, Subject, audit, audit_engine,
