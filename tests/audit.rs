@@ -188,14 +188,23 @@ fn fills_that_cannot_be_are_found_out() {
     let spoilt = |spoil: fn(&mut Fill)| {
         move |backtest: &Backtest, strategy: &mut dyn Strategy| {
             let mut record = backtest.run(strategy)?;
-            spoil(&mut record.blotter.fills[20]);
+            // Runs that were cut off may have less.
+            record.blotter.fills.get_mut(20).into_iter().for_each(spoil);
             Ok(record)
         }
     };
     for (spoil, expected, verdict) in [
         ((|f| f.filled_at = Timestamp(0)) as fn(&mut Fill), Impossible::BeforeDecision, AuditVerdict::Lookahead),
-        (|f| f.filled_at = f.filled_at + 86_400 * 300 * Timestamp::NANOS, Impossible::NoMarket, AuditVerdict::ImpossibleFills),
-        (|f| f.price = Price(f.price.0 - f.side.sign() as i64 * 5 * 1_000_000_000), Impossible::OutsideRange, AuditVerdict::ImpossibleFills),
+        (
+            |f| f.filled_at = f.filled_at + 86_400 * 300 * Timestamp::NANOS,
+            Impossible::NoMarket,
+            AuditVerdict::ImpossibleFills,
+        ),
+        (
+            |f| f.price = Price(f.price.0 - f.side.sign() as i64 * 5 * 1_000_000_000),
+            Impossible::OutsideRange,
+            AuditVerdict::ImpossibleFills,
+        ),
     ] {
         let audit = registered(vec![barred()], CROSS, &spoilt(spoil));
         let faults: Vec<Impossible> = audit.impossible_fills.iter().map(|fault| fault.fault).collect();
@@ -223,14 +232,20 @@ fn quoted(late: i64) -> History {
             quotes.push(bar.open_at + k * MINUTE / 6, &level(mid - 0.01), &level(mid + 0.01));
         }
     }
-    let stamped = bars.iter().map(|bar| Bar { open_at: bar.open_at + late * MINUTE, known_at: bar.known_at + late * MINUTE, ..*bar });
+    let stamped =
+        bars.iter().map(|bar| Bar { open_at: bar.open_at + late * MINUTE, known_at: bar.known_at + late * MINUTE, ..*bar });
     History::new(stamped.collect(), quotes).unwrap()
 }
 
 #[test]
 fn a_bar_stamped_at_its_open_is_found_out_where_there_are_quotes() {
     let audit = registered(vec![quoted(0)], CROSS, &as_it_is);
-    assert_eq!((audit.verdict, audit.known_early.len(), audit.untold.len()), (AuditVerdict::Clean, 0, 0), "{}", audit.summary);
+    assert_eq!(
+        (audit.verdict, audit.known_early.len(), audit.untold.len()),
+        (AuditVerdict::Clean, 0, 0),
+        "{}",
+        audit.summary
+    );
     let audit = registered(vec![quoted(-1)], CROSS, &as_it_is);
     assert_eq!(audit.verdict, AuditVerdict::Lookahead);
     assert_eq!((audit.known_early.len(), audit.known_early[0].seconds), (1, 60.0), "{}", audit.summary);

@@ -130,7 +130,9 @@ fn a_sweep_is_the_same_at_any_number_of_threads_and_when_it_goes_on() {
 #[test]
 fn draws_do_not_depend_on_how_many_there_are() {
     let random = |runs: usize| {
-        format!("[sweep]\nmethod = 'random'\nruns = {runs}\nseed = 5\nmetric = 'total_return'\n[sweep.ranges]\n'strategy.fast' = {{ from = 2, to = 20 }}\n'mechanism.half_spread.bps' = {{ from = 0.1, to = 10.0, log = true }}\n")
+        format!(
+            "[sweep]\nmethod = 'random'\nruns = {runs}\nseed = 5\nmetric = 'total_return'\n[sweep.ranges]\n'strategy.fast' = {{ from = 2, to = 20 }}\n'mechanism.half_spread.bps' = {{ from = 0.1, to = 10.0, log = true }}\n"
+        )
     };
     let column = |runs: usize, name: &str| {
         let scene = Scene::new(&random(runs));

@@ -25,7 +25,10 @@ fn bars(changed: Option<i64>) -> String {
         }
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let open: f64 = close;
-        close = (open * (1.0 + 0.004 * (((state >> 33) % 201) as f64 / 100.0 - 1.0 + 0.3 * (hour as f64 / 37.0).sin())) * 100.0).round() / 100.0;
+        close =
+            (open * (1.0 + 0.004 * (((state >> 33) % 201) as f64 / 100.0 - 1.0 + 0.3 * (hour as f64 / 37.0).sin())) * 100.0)
+                .round()
+                / 100.0;
         let (high, low) = (open.max(close), open.min(close));
         writeln!(text, "{},{open},{high},{low},{close},1000", hour * HOUR).unwrap();
     }
@@ -131,7 +134,10 @@ fn a_choice_is_the_best_of_a_sweep_of_its_training() {
     let window = &windows(&found)[1];
     // Bars known from start on, and before end.
     let between = format!("cash = 1_000_000\nstart = '1970-01-07T01:00:00Z'\nend = '1970-01-23T01:00:00Z'");
-    assert_eq!([&window["train_start"], &window["train_end"]].map(|t| t.as_i64().unwrap()), [6 * DAY + HOUR, 22 * DAY + HOUR]);
+    assert_eq!(
+        [&window["train_start"], &window["train_end"]].map(|t| t.as_i64().unwrap()),
+        [6 * DAY + HOUR, 22 * DAY + HOUR]
+    );
     fs::write(scene.path("train.toml"), format!("{RUN}{SWEEP}").replace("cash = 1_000_000", &between)).unwrap();
     let sweep = scene.json("sweep train.toml");
     assert_eq!(sweep["best"][0]["values"], window["chosen"]["values"]);
@@ -165,7 +171,9 @@ fn tests_in_a_row_are_one_account_that_begins_flat() {
 #[test]
 fn a_test_is_a_backtest_of_its_time() {
     let sweep = "[sweep]\nmetric = 'total_return'\n[sweep.ranges]\n'strategy.weight' = [0.5]\n[sweep.walk_forward]\ntrain = '16d'\ntest = '10d'\n";
-    let hold = |text: &str| text.replace("kind = 'sma_cross'\nfast = 3\nslow = 30\nshort = true", "kind = 'buy_and_hold'\nweight = 0.5");
+    let hold = |text: &str| {
+        text.replace("kind = 'sma_cross'\nfast = 3\nslow = 30\nshort = true", "kind = 'buy_and_hold'\nweight = 0.5")
+    };
     let scene = Scene::new(sweep, None);
     fs::write(scene.path("run.toml"), hold(&format!("{RUN}{sweep}"))).unwrap();
     let found = scene.json("walk-forward run.toml");

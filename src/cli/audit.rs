@@ -100,7 +100,8 @@ fn told(screen: &Screen, audit: &Audit) -> String {
     if !audit.impossible_fills.is_empty() {
         let mut table = screen.table([">order", "of", "decided", "filled", ">price", ">lowest", ">highest", "fault"]);
         for fault in audit.impossible_fills.iter().take(SHOWN) {
-            let [low, high] = [fault.range.map(|r| r.0), fault.range.map(|r| r.1)].map(|p| p.map_or_else(String::new, |p| p.to_string()));
+            let [low, high] =
+                [fault.range.map(|r| r.0), fault.range.map(|r| r.1)].map(|p| p.map_or_else(String::new, |p| p.to_string()));
             table.add_row([
                 fault.order_id.to_string(),
                 fault.instrument.clone(),
@@ -125,7 +126,9 @@ fn told(screen: &Screen, audit: &Audit) -> String {
     }
     if !audit.untold.is_empty() {
         let symbols = audit.untold.join(", ");
-        let note = format!("With bars alone it cannot be told whether `stamp` says when they were known ({symbols}): quotes of the same instrument would tell.");
+        let note = format!(
+            "With bars alone it cannot be told whether `stamp` says when they were known ({symbols}): quotes of the same instrument would tell."
+        );
         text += &format!("\n{}\n", screen.wrapped("", &note));
     }
     text

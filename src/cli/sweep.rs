@@ -34,7 +34,7 @@ Examples:
 
 In run.toml:
   [sweep]
-  metric = \"sharpe\"                             # any figure of run.json; goal = \"min\" where less is better
+  metric = \"sharpe\"         # any figure of run.json; goal = \"min\" where less is better
   [sweep.ranges]
   \"strategy.fast\" = { from = 5, to = 20, step = 5 }
   \"mechanism.half_spread.bps\" = { from = 0.5, to = 2.0, log = true, count = 5 }
@@ -139,7 +139,13 @@ fn metric_names() -> Vec<String> {
     };
     let value = Metrics::of(&empty).ok().and_then(|metrics| serde_json::to_value(&metrics).ok()).unwrap_or_default();
     let known: BTreeMap<String, f64> = Metrics::of(&empty).map(|metrics| figures(&metrics)).unwrap_or_default();
-    let mut names: Vec<String> = value.as_object().into_iter().flatten().filter(|(_, value)| !value.is_object()).map(|(name, _)| name.clone()).collect();
+    let mut names: Vec<String> = value
+        .as_object()
+        .into_iter()
+        .flatten()
+        .filter(|(_, value)| !value.is_object())
+        .map(|(name, _)| name.clone())
+        .collect();
     names.extend(known.into_keys().filter(|name| name.contains('.')));
     names.extend(["max_drawdown.depth", "max_drawdown.seconds"].map(str::to_owned));
     names.retain(|name| name != "max_drawdown");
@@ -150,7 +156,9 @@ fn metric_names() -> Vec<String> {
 pub(super) fn make(file: &RunFile) -> Result<Box<dyn Strategy>, Refused> {
     let table = strategy_table(file).map_err(Refused::Input)?;
     crate::strategies::build(&table).map_err(|error| match &error {
-        StrategyError::Value { .. } => Refused::Invalid(error.to_string().replace("\nhint: ", ": ").replace("[strategy] ", "")),
+        StrategyError::Value { .. } => {
+            Refused::Invalid(error.to_string().replace("\nhint: ", ": ").replace("[strategy] ", ""))
+        }
         StrategyError::NoKind(_) | StrategyError::Unknown { .. } | StrategyError::Parameter { .. } => {
             Refused::Input(explained_strategy(file, &error))
         }

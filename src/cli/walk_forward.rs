@@ -19,7 +19,9 @@ use super::sweep::{belongs, make, section};
 /// of training and test, what is left out between the two (purge and embargo), and whether training is anchored to the start
 /// of the data. A test begins with cash and with as much of the past as its strategy looks back on, and no orders before it.
 #[derive(Debug, Args)]
-#[command(name = "walk-forward", after_help = "\
+#[command(
+    name = "walk-forward",
+    after_help = "\
 Examples:
   trueup walk-forward run.toml
   trueup walk-forward run.toml --out walks/first
@@ -30,7 +32,8 @@ In run.toml, beside [sweep] and [sweep.ranges]:
   test = \"30d\"
   purge = \"1d\"
   embargo = \"1d\"
-  anchored = false")]
+  anchored = false"
+)]
 pub(super) struct Walk {
     /// TOML file of the run, with sections [sweep] and [sweep.walk_forward]
     run: PathBuf,

@@ -80,7 +80,12 @@ impl RunFile {
         let shape = match root {
             "strategy" | "run" => name.is_empty() && !key.is_empty(),
             "mechanism" | "instrument" => !name.is_empty() && !key.is_empty(),
-            "data" => return Err(refuse("the data cannot be swept over: they are read once".to_owned(), Some("make a run of its own for other data".to_owned()))),
+            "data" => {
+                return Err(refuse(
+                    "the data cannot be swept over: they are read once".to_owned(),
+                    Some("make a run of its own for other data".to_owned()),
+                ));
+            }
             _ => return Err(refuse(format!("`{path}` leads to nothing that can be swept over"), hint_among(root, &ROOTS))),
         };
         if !shape {
@@ -97,9 +102,11 @@ impl RunFile {
         }
         let label = if root == "mechanism" { "name" } else { "symbol" };
         let entries = table.get_mut(root).and_then(Value::as_array_mut).map(Vec::as_mut_slice).unwrap_or_default();
-        let known: Vec<String> =
-            entries.iter().filter_map(|entry| entry.get(label)?.as_str().map(str::to_owned)).collect();
-        let entry = entries.iter_mut().filter_map(Value::as_table_mut).find(|entry| entry.get(label).and_then(Value::as_str) == Some(name));
+        let known: Vec<String> = entries.iter().filter_map(|entry| entry.get(label)?.as_str().map(str::to_owned)).collect();
+        let entry = entries
+            .iter_mut()
+            .filter_map(Value::as_table_mut)
+            .find(|entry| entry.get(label).and_then(Value::as_str) == Some(name));
         let Some(entry) = entry else {
             let none = format!("add a [[{root}]] with {label} = \"{name}\" to the run");
             let hint = hint_among(name, &known).filter(|hint| hint.starts_with("did you")).unwrap_or(none);

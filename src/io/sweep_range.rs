@@ -126,7 +126,9 @@ impl SweepRange {
             if values.is_empty() {
                 return Err(self.error(document, "the range is empty").hint("give at least one value"));
             }
-            if let Some(value) = values.iter().find(|value| matches!(value, Value::Array(_) | Value::Table(_) | Value::Datetime(_))) {
+            if let Some(value) =
+                values.iter().find(|value| matches!(value, Value::Array(_) | Value::Table(_) | Value::Datetime(_)))
+            {
                 let error = self.error(document, "expected a list of numbers, texts, or true and false");
                 return Err(error.found(value).hint("each value is put in the place of one key"));
             }
@@ -134,51 +136,54 @@ impl SweepRange {
         Ok(())
     }
 
-    /// Number of values, where it is known.
+    /// Number of values, where it is known: whole numbers without `step` and `count` are all taken.
     #[must_use]
     pub fn count(&self) -> Option<usize> {
-        self.grid().map(|values| values.len())
+        match &self.values {
+            RangeValues::Listed(values) => Some(values.len()),
+            RangeValues::Span { count: Some(count), .. } => Some(*count),
+            // The last step may miss the end by the rounding of a division.
+            RangeValues::Span { from, to, step: Some(step), .. } => Some(((to - from) / step + 1e-9).floor() as usize + 1),
+            RangeValues::Span { from, to, log: false, whole: true, .. } if to - from < Self::MOST as f64 => {
+                Some((to - from) as usize + 1)
+            }
+            RangeValues::Span { from, to, .. } => (from == to).then_some(1),
+        }
     }
 
-    /// The values, in order, where it is known which they are: whole numbers without `step` and `count` are all taken.
+    /// The values in order, where it is known which they are; whole numbers that fall together are there once.
     #[must_use]
     pub fn grid(&self) -> Option<Vec<Value>> {
-        let (from, to, step, count, log, whole) = match &self.values {
-            RangeValues::Listed(values) => return Some(values.clone()),
-            RangeValues::Span { from, to, step, count, log, whole } => (*from, *to, *step, *count, *log, *whole),
-        };
-        let count = match (count, step) {
-            (Some(count), _) => count,
-            // The last step may miss the end by the rounding of a division.
-            (None, Some(step)) => ((to - from) / step + 1e-9).floor() as usize + 1,
-            (None, None) if whole && !log && to - from < Self::MOST as f64 => (to - from) as usize + 1,
-            (None, None) if from == to => 1,
-            (None, None) => return None,
-        };
-        let at = |k: usize| match step {
-            Some(step) => from + k as f64 * step,
-            None => between(from, to, log, k as f64 / (count.max(2) - 1) as f64),
-        };
-        let mut values: Vec<Value> = (0..count).map(|k| written(at(k), whole)).collect();
-        values.dedup();
+        let count = self.count()?;
+        let mut values: Vec<Value> = (0..count).map(|k| self.nth(k, count)).collect();
+        if matches!(self.values, RangeValues::Span { .. }) {
+            values.dedup();
+        }
         Some(values)
     }
 
-    /// The value at `place`, from 0 to below 1.
+    /// The value at `place`, from 0 to below 1: one of those of a grid where there are such, else any between the ends.
     #[must_use]
     pub fn at(&self, place: f64) -> Value {
-        if let (RangeValues::Span { from, to, step: None, count: None, log, whole }, true) =
-            (&self.values, (0.0..1.0).contains(&place))
-        {
-            return match (whole, log) {
-                (true, false) => written((from + (place * (to - from + 1.0)).floor()).min(*to), true),
-                (whole, log) => written(between(*from, *to, *log, place), *whole),
-            };
+        match (&self.values, self.count()) {
+            (_, Some(count)) => self.nth(((place * count as f64) as usize).min(count.saturating_sub(1)), count),
+            (RangeValues::Span { from, to, log: false, whole: true, .. }, None) => {
+                written((from + (place * (to - from + 1.0)).floor()).min(*to), true)
+            }
+            (RangeValues::Span { from, to, log, whole, .. }, None) => written(between(*from, *to, *log, place), *whole),
+            (RangeValues::Listed(_), None) => Value::Integer(0),
         }
-        let values = self.grid().unwrap_or_default();
-        let last = values.len().saturating_sub(1);
-        let index = ((place * values.len() as f64) as usize).min(last);
-        values.into_iter().nth(index).unwrap_or(Value::Integer(0))
+    }
+
+    /// The `k`-th of `count` values.
+    fn nth(&self, k: usize, count: usize) -> Value {
+        match &self.values {
+            RangeValues::Listed(values) => values.get(k).cloned().unwrap_or(Value::Integer(0)),
+            RangeValues::Span { from, step: Some(step), whole, .. } => written(from + k as f64 * step, *whole),
+            RangeValues::Span { from, to, log, whole, .. } => {
+                written(between(*from, *to, *log, k as f64 / (count.max(2) - 1) as f64), *whole)
+            }
+        }
     }
 }
 
@@ -198,7 +203,8 @@ mod tests {
     fn range(text: &str) -> SweepRange {
         let document = Document::from_text("run.toml", format!("[sweep.ranges]\nx = {text}\n"));
         let table: toml::Table = document.parse().unwrap();
-        SweepRange::of(&document, ["sweep", "ranges", "x"].map(str::to_owned).to_vec(), &table["sweep"]["ranges"]["x"]).unwrap()
+        SweepRange::of(&document, ["sweep", "ranges", "x"].map(str::to_owned).to_vec(), &table["sweep"]["ranges"]["x"])
+            .unwrap()
     }
 
     fn grid(text: &str) -> Vec<f64> {

@@ -98,7 +98,7 @@ fn sharpe() -> String {
 
 impl SweepSection {
     /// The most runs of a sweep.
-    pub const MOST: usize = 1_000_000;
+    pub const MOST: usize = 100_000;
 
     /// The section of `document`, its ranges held to make sense by themselves.
     pub(super) fn of(document: &Document, table: SweepTable) -> Result<Self, InputError> {
@@ -160,12 +160,7 @@ impl SweepSection {
 }
 
 /// Ranges at `keys` and below: `"strategy.fast" = ...` and `strategy.fast = ...` are the same.
-fn collect(
-    document: &Document,
-    keys: &mut Vec<String>,
-    value: &Value,
-    all: &mut Vec<SweepRange>,
-) -> Result<(), InputError> {
+fn collect(document: &Document, keys: &mut Vec<String>, value: &Value, all: &mut Vec<SweepRange>) -> Result<(), InputError> {
     match value {
         Value::Table(table) if !["from", "to", "step", "count", "log"].iter().any(|key| table.contains_key(*key)) => {
             for (key, value) in table {

@@ -49,7 +49,8 @@ mod venue;
 pub mod walk_forward;
 
 pub use audit::{
-    Audit, AuditSettings, AuditVerdict, Change, Cut, Difference, Engine, FillFault, Impossible, KnownEarly, Subject, audit, audit_engine,
+    Audit, AuditSettings, AuditVerdict, Change, Cut, Difference, Engine, FillFault, Impossible, KnownEarly, Subject, audit,
+    audit_engine,
 };
 pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 pub use bar::Bar;

@@ -49,7 +49,8 @@ impl JournalFile {
         if start == Start::Resume && path.exists() {
             let journal = read(path)?;
             if journal.header != *header {
-                let error = InputError::new(path, "holds another sweep: the run, its data or the program have changed since");
+                let error =
+                    InputError::new(path, "holds another sweep: the run, its data or the program have changed since");
                 return Err(error.hint("--force begins anew, --out names another folder").into());
             }
             let file = OpenOptions::new().write(true).open(path).map_err(|error| failed(path, &error))?;
@@ -82,9 +83,8 @@ impl JournalFile {
 
 fn read(path: &Path) -> Result<Journal, InputError> {
     let text = fs::read_to_string(path).map_err(|error| InputError::new(path, format!("cannot be read ({error})")))?;
-    Journal::read(&text).map_err(|error| {
-        InputError::new(path, error.to_string()).hint("--force begins anew, --out names another folder")
-    })
+    Journal::read(&text)
+        .map_err(|error| InputError::new(path, error.to_string()).hint("--force begins anew, --out names another folder"))
 }
 
 fn failed(path: &Path, error: &std::io::Error) -> InputError {

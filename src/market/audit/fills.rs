@@ -111,7 +111,12 @@ fn range(history: &History, decided_at: Timestamp, time: Timestamp) -> Option<(f
         // A bar begins when the one before it ends: at that instant both count, unless the earlier one had been seen.
         let bars = history.bars();
         let first = bars.partition_point(|bar| bar.known_at < time || bar.known_at <= decided_at);
-        bars[first..].iter().take_while(|bar| bar.open_at <= time).flat_map(|bar| [bar.low, bar.high]).map(|p| p.to_f64()).collect()
+        bars[first..]
+            .iter()
+            .take_while(|bar| bar.open_at <= time)
+            .flat_map(|bar| [bar.low, bar.high])
+            .map(|p| p.to_f64())
+            .collect()
     } else {
         quoted(history, time)
     };

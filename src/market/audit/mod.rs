@@ -22,8 +22,8 @@ pub use fills::{FillFault, Impossible};
 pub use future::Change;
 pub(super) use future::with_future;
 pub use known_early::KnownEarly;
-pub use trace::{Difference, Subject};
 pub(super) use trace::{Decision, Trace, difference, trace};
+pub use trace::{Difference, Subject};
 
 /// What runs a strategy: [`Backtest::run`], or what is to be audited in its place.
 pub type Engine<'a> = &'a (dyn Fn(&Backtest, &mut dyn Strategy) -> Result<Record, BacktestError> + Sync);
@@ -133,9 +133,8 @@ where
     F: Fn(&[History]) -> Result<Box<dyn Strategy>, E> + Sync,
     E: From<BacktestError> + Send,
 {
-    let run = |backtest: &Backtest| -> Result<Trace, E> {
-        Ok(trace(engine, backtest, make(backtest.histories())?.as_mut()))
-    };
+    let run =
+        |backtest: &Backtest| -> Result<Trace, E> { Ok(trace(engine, backtest, make(backtest.histories())?.as_mut())) };
     let runs = 2 * settings.cuts + 2;
     told(0, runs);
     let was = run(backtest)?;
@@ -221,7 +220,10 @@ impl Audit {
         if let Some((cut, change, found)) = self.first() {
             let (subject, at) = (found.subject.word(), cut.at);
             let how = change.words();
-            said.push(format!("{name} sees the future: its {subject} at {} is another when what is known after {at} is {how}.", found.time));
+            said.push(format!(
+                "{name} sees the future: its {subject} at {} is another when what is known after {at} is {how}.",
+                found.time
+            ));
         }
         for early in &self.known_early {
             let KnownEarly { instrument, seconds, .. } = early;
@@ -229,7 +231,10 @@ impl Audit {
         }
         if let Some(fault) = self.impossible_fills.first() {
             let (count, words) = (self.impossible, fault.fault.words());
-            said.push(format!("{count} fills cannot be; the first, of order {} at {}: {words}.", fault.order_id, fault.filled_at));
+            said.push(format!(
+                "{count} fills cannot be; the first, of order {} at {}: {words}.",
+                fault.order_id, fault.filled_at
+            ));
         }
         if said.is_empty() && self.decisions == 0 {
             said.push(format!("{name} asked for no order, so that there was nothing to compare."));
@@ -247,7 +252,8 @@ fn instants(histories: &[History], decisions: &[Decision], settings: AuditSettin
     let mut events = known_times(histories);
     events.dedup();
     let last = events.pop();
-    let mut decided: Vec<Timestamp> = decisions.iter().map(|decision| decision.time).filter(|time| Some(*time) != last).collect();
+    let mut decided: Vec<Timestamp> =
+        decisions.iter().map(|decision| decision.time).filter(|time| Some(*time) != last).collect();
     decided.dedup();
     let at_decisions = (settings.cuts / 2).min(decided.len());
     let drawn = |all: &[Timestamp], count: usize, name: &str| -> Vec<Timestamp> {

@@ -99,7 +99,12 @@ pub(in crate::market) fn trace(engine: Engine<'_>, backtest: &Backtest, strategy
 
 /// The first thing up to `now` that is not the same, to the last bit, in both runs: orders asked for and refused and the
 /// account's worth up to `now`, fills before it (what is filled at an instant is not seen at it).
-pub(in crate::market) fn difference(was: &Trace, became: &Trace, now: Timestamp, about: &[Instrument]) -> Option<Difference> {
+pub(in crate::market) fn difference(
+    was: &Trace,
+    became: &Trace,
+    now: Timestamp,
+    about: &[Instrument],
+) -> Option<Difference> {
     let requests = series(Subject::Request, &was.decisions, &became.decisions, |d| d.time <= now, about);
     let (Ok(was), Ok(became)) = (&was.record, &became.record) else { return requests };
     let refused = [&was.blotter.rejections, &became.blotter.rejections];
@@ -183,7 +188,8 @@ impl Happened for Fill {
         format!("{} at {}", sided(self.side, self.quantity), self.price.to_f64())
     }
     fn same(&self, other: &Self) -> bool {
-        (self.order_id, self.instrument, self.filled_at, self.side) == (other.order_id, other.instrument, other.filled_at, other.side)
+        (self.order_id, self.instrument, self.filled_at, self.side)
+            == (other.order_id, other.instrument, other.filled_at, other.side)
             && (self.quantity, self.price, self.fee) == (other.quantity, other.price, other.fee)
     }
 }

@@ -21,8 +21,8 @@ use super::{Backtest, History, PreparedRun, Strategy};
 pub use journal::{Header, JOURNAL, Journal, JournalError, Line};
 pub use plan::{Values, plan};
 pub use selection::{best, ranked};
-pub(super) use summary::{column, shown};
 pub use summary::{Ranked, SweepSummary, sweep_table};
+pub(super) use summary::{column, head, shown};
 pub use trial::{Outcome, Trial, figures};
 
 /// Why a strategy was not built.
@@ -34,6 +34,9 @@ pub enum Refused {
     Input(InputError),
 }
 
+/// Builds the strategy of a run.
+pub type Make = dyn Fn(&RunFile) -> Result<Box<dyn Strategy>, Refused> + Sync;
+
 /// A run, and how it is tried with other values.
 pub struct Sweep<'a> {
     /// The run as it is written.
@@ -41,7 +44,7 @@ pub struct Sweep<'a> {
     /// The same, its data read.
     pub prepared: &'a PreparedRun,
     /// Builds the strategy of a run.
-    pub make: &'a (dyn Fn(&RunFile) -> Result<Box<dyn Strategy>, Refused> + Sync),
+    pub make: &'a Make,
     /// Whether a kind of strategy (the first) has a parameter (the second).
     pub belongs: &'a (dyn Fn(&str, &str) -> bool + Sync),
 }

@@ -6,7 +6,7 @@ use crate::io::{SweepGoal, SweepSection};
 use crate::report::quantity::{UNDEFINED, number as rounded};
 use crate::report::{HeatMap, Listing, Scatter, SweepPage};
 
-use super::summary::{number, shown};
+use super::summary::{head, number, shown};
 use super::{SweepSummary, Trial};
 
 /// Cells of a heat map a side at most.
@@ -31,7 +31,8 @@ impl SweepSummary {
         let Some(best) = self.best.first() else {
             return format!("None of {} runs has the figure {}.", self.runs, self.metric);
         };
-        let values: Vec<String> = best.trial.values.iter().map(|(path, value)| format!("{path} = {}", shown(value))).collect();
+        let values: Vec<String> =
+            best.trial.values.iter().map(|(path, value)| format!("{path} = {}", shown(value))).collect();
         let median = self.median.map_or_else(|| UNDEFINED.to_owned(), rounded);
         format!(
             "Of {} runs the best {} is {}, with {}; the median is {median}.",
@@ -45,7 +46,10 @@ impl SweepSummary {
     /// What the figures rest on, line by line.
     #[must_use]
     pub fn about(&self) -> Vec<String> {
-        let mut said = vec![format!("{} runs came to their end, {} were refused by the strategy, {} failed.", self.done, self.invalid, self.failed)];
+        let mut said = vec![format!(
+            "{} runs came to their end, {} were refused by the strategy, {} failed.",
+            self.done, self.invalid, self.failed
+        )];
         said.extend(self.reasons.iter().map(|(why, count)| format!("{count} times: {why}.")));
         said.push(match self.deflated_sharpe {
             Some(part) => format!("The deflated Sharpe ratio of the best is {}: the probability that it is more than the luck of so many runs.", rounded(part)),
@@ -60,14 +64,16 @@ impl SweepSummary {
         let mut figures: Vec<&str> = ["sharpe", "total_return", "max_drawdown.depth", "turnover"].to_vec();
         figures.retain(|name| *name != self.metric);
         let heads = std::iter::once(self.metric.clone())
-            .chain(self.ranges.iter().cloned())
-            .chain(figures.iter().map(|name| (*name).to_owned()))
+            .chain(self.ranges.iter().map(|path| head(path, &self.ranges)))
+            .chain(figures.iter().map(|name| name.trim_end_matches(".depth").to_owned()))
             .chain(["run".to_owned()]);
         let row = |ranked: &super::Ranked| {
             let values = self.ranges.iter().map(|path| ranked.trial.values.get(path).map(shown));
             let figures = figures.iter().map(|name| ranked.trial.outcome.figure(name).map(rounded));
             let all = std::iter::once(Some(rounded(ranked.value))).chain(values).chain(figures);
-            all.chain([Some(ranked.trial.index.to_string())]).map(|cell| cell.unwrap_or_else(|| UNDEFINED.to_owned())).collect()
+            all.chain([Some(ranked.trial.index.to_string())])
+                .map(|cell| cell.unwrap_or_else(|| UNDEFINED.to_owned()))
+                .collect()
         };
         Listing { heads: heads.collect(), rows: self.best.iter().map(row).collect() }
     }

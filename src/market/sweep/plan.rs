@@ -55,7 +55,8 @@ fn draw(section: &SweepSection, seed: Seed) -> Values {
 }
 
 fn fitting(values: Values, belongs: &dyn Fn(&str, &str) -> bool) -> Values {
-    let kind = values.iter().find(|(path, _)| path == "strategy.kind").and_then(|(_, kind)| kind.as_str().map(str::to_owned));
+    let kind =
+        values.iter().find(|(path, _)| path == "strategy.kind").and_then(|(_, kind)| kind.as_str().map(str::to_owned));
     let Some(kind) = kind else { return values };
     let fits = |path: &str| path.strip_prefix("strategy.").is_none_or(|key| key == "kind" || belongs(&kind, key));
     values.into_iter().filter(|(path, _)| fits(path)).collect()

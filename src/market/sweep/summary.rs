@@ -87,7 +87,11 @@ impl SweepSummary {
             failed: count("failed"),
             reasons,
             deflated_sharpe: ranked.first().and_then(|(best, _)| selection::deflated_sharpe(best, trials)),
-            best: ranked.iter().take(Self::BEST).map(|(trial, value)| Ranked { value: *value, trial: (*trial).clone() }).collect(),
+            best: ranked
+                .iter()
+                .take(Self::BEST)
+                .map(|(trial, value)| Ranked { value: *value, trial: (*trial).clone() })
+                .collect(),
             median: values.len().checked_sub(1).map(|last| values[last / 2]),
             inputs: sweep.prepared.provenance.inputs.clone(),
         }
@@ -96,8 +100,11 @@ impl SweepSummary {
 
 /// A reason without the numbers that differ from run to run.
 fn reason(why: &str) -> String {
-    let words = why.split(' ').map(|word| if word.chars().any(|c| c.is_ascii_digit()) { "..." } else { word });
-    words.collect::<Vec<_>>().join(" ")
+    let word = |word: &str| match word.trim_end_matches([':', ',', ';']) {
+        number if number.chars().any(|c| c.is_ascii_digit()) => format!("...{}", &word[number.len()..]),
+        _ => word.to_owned(),
+    };
+    why.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// `sweep.parquet`: a row a run with its number, outcome, seed, hash, values by path and figures by name.
@@ -146,11 +153,21 @@ pub(in crate::market) fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }
 
+/// The end of a path that tells it from the others.
+pub(in crate::market) fn head(path: &str, all: &[String]) -> String {
+    let last = |path: &str| path.rsplit('.').next().unwrap_or_default().to_owned();
+    let alone = all.iter().filter(|other| last(other) == last(path)).count() <= 1;
+    if alone { last(path) } else { path.to_owned() }
+}
+
 /// A value as people read it.
 pub(in crate::market) fn shown(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
-        Value::Float(number) => crate::report::quantity::significant(*number, 4),
+        Value::Float(number) => {
+            let digits = crate::report::quantity::significant(*number, 4);
+            if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.').to_owned() } else { digits }
+        }
         other => other.to_string(),
     }
 }

@@ -278,6 +278,12 @@ fn no_metric(sweep: &Sweep<'_>, section: &SweepSection, trials: &[Trial]) -> Inp
         Outcome::Done { .. } => None,
     });
     let message = format!("none of {} runs of the first training has the figure `{}`", trials.len(), section.metric);
-    let hint = format!("ratios of a year take {} daily returns: lengthen `train`, or take metric = \"total_return\"", Returns::FEWEST);
-    sweep.run.error(&["sweep", "metric"], message).hint(why.filter(|_| trials.iter().all(|t| t.outcome.word() != "done")).unwrap_or(hint))
+    let hint = format!(
+        "ratios of a year take {} daily returns: lengthen `train`, or take metric = \"total_return\"",
+        Returns::FEWEST
+    );
+    sweep
+        .run
+        .error(&["sweep", "metric"], message)
+        .hint(why.filter(|_| trials.iter().all(|t| t.outcome.word() != "done")).unwrap_or(hint))
 }

@@ -2,7 +2,7 @@
 
 use chrono::DateTime;
 
-use crate::market::sweep::shown;
+use crate::market::sweep::{head, shown};
 use crate::report::quantity::{UNDEFINED, decimals, number};
 use crate::report::{Listing, WalkForwardPage};
 use crate::sim2real::Timestamp;
@@ -27,8 +27,10 @@ impl WalkForward {
     #[must_use]
     pub fn headline(&self) -> String {
         let found = &self.out_of_sample;
-        let gained = found.total_return.map_or_else(|| UNDEFINED.to_owned(), |part| format!("{}\u{a0}%", decimals(100.0 * part, 2)));
-        let sharpe = found.returns.sharpe.map_or_else(String::new, |ratio| format!(", at a Sharpe ratio of {}", number(ratio)));
+        let gained =
+            found.total_return.map_or_else(|| UNDEFINED.to_owned(), |part| format!("{}\u{a0}%", decimals(100.0 * part, 2)));
+        let sharpe =
+            found.returns.sharpe.map_or_else(String::new, |ratio| format!(", at a Sharpe ratio of {}", number(ratio)));
         format!("Out of sample, {} windows in a row gained {gained} after costs{sharpe}.", self.windows.len())
     }
 
@@ -48,7 +50,8 @@ impl WalkForward {
                 number(outside)
             ));
         }
-        let failed = self.windows.iter().filter_map(|step| Some(format!("Window {}: {}.", step.index + 1, step.failed.as_ref()?)));
+        let failed =
+            self.windows.iter().filter_map(|step| Some(format!("Window {}: {}.", step.index + 1, step.failed.as_ref()?)));
         said.extend(failed);
         let idle = self.windows.iter().filter(|step| step.chosen.is_none()).count();
         if idle > 0 {
@@ -61,7 +64,8 @@ impl WalkForward {
     fn means(&self) -> (Option<f64>, Option<f64>) {
         let both = |step: &Step| Some((step.chosen.as_ref()?.value, *step.out_of_sample.get(&self.metric)?));
         let all: Vec<(f64, f64)> = self.windows.iter().filter_map(both).collect();
-        let mean = |of: fn(&(f64, f64)) -> f64| (!all.is_empty()).then(|| all.iter().map(of).sum::<f64>() / all.len() as f64);
+        let mean =
+            |of: fn(&(f64, f64)) -> f64| (!all.is_empty()).then(|| all.iter().map(of).sum::<f64>() / all.len() as f64);
         (mean(|pair| pair.0), mean(|pair| pair.1))
     }
 
@@ -77,12 +81,16 @@ impl WalkForward {
             let times = [window.train_start, window.train_end, window.test_start, window.test_end].map(day);
             let chosen = step.chosen.as_ref();
             let values = paths.iter().map(|path| chosen.and_then(|chosen| chosen.values.get(path)).map(shown));
-            let figures = [chosen.map(|chosen| chosen.value), step.out_of_sample.get(&self.metric).copied(), step.out_of_sample.get("total_return").copied()];
+            let figures = [
+                chosen.map(|chosen| chosen.value),
+                step.out_of_sample.get(&self.metric).copied(),
+                step.out_of_sample.get("total_return").copied(),
+            ];
             let all = values.chain(figures.map(|figure| figure.map(number)));
             times.into_iter().chain(all.map(|cell| cell.unwrap_or_else(|| UNDEFINED.to_owned()))).collect()
         };
         Listing {
-            heads: heads.chain(paths.iter().cloned()).chain(figures).collect(),
+            heads: heads.chain(paths.iter().map(|path| head(path, &paths))).chain(figures).collect(),
             rows: self.windows.iter().map(row).collect(),
         }
     }
