@@ -30,7 +30,7 @@ fn walk(count: usize) -> Vec<f64> {
 fn bars(closes: &[f64]) -> Vec<Bar> {
     let at = |k: usize| Timestamp(((k / 200) * 1_440 + k % 200) as i64 * MINUTE);
     let bar = |k: usize| {
-        let open = Price::nearest(closes[k.saturating_sub(1)] + if k % 2 == 0 { 0.02 } else { -0.03 }).unwrap();
+        let open = Price::nearest(closes[k.saturating_sub(1)] + if k.is_multiple_of(2) { 0.02 } else { -0.03 }).unwrap();
         let close = Price::nearest(closes[k]).unwrap();
         let (high, low) = (open.max(close), open.min(close));
         Bar { open_at: at(k), known_at: at(k) + MINUTE, open, high, low, close, volume: 1_000.0 }

@@ -133,12 +133,12 @@ fn a_choice_is_the_best_of_a_sweep_of_its_training() {
     let found = scene.json("walk-forward run.toml");
     let window = &windows(&found)[1];
     // Bars known from start on, and before end.
-    let between = format!("cash = 1_000_000\nstart = '1970-01-07T01:00:00Z'\nend = '1970-01-23T01:00:00Z'");
+    let between = "cash = 1_000_000\nstart = '1970-01-07T01:00:00Z'\nend = '1970-01-23T01:00:00Z'";
     assert_eq!(
         [&window["train_start"], &window["train_end"]].map(|t| t.as_i64().unwrap()),
         [6 * DAY + HOUR, 22 * DAY + HOUR]
     );
-    fs::write(scene.path("train.toml"), format!("{RUN}{SWEEP}").replace("cash = 1_000_000", &between)).unwrap();
+    fs::write(scene.path("train.toml"), format!("{RUN}{SWEEP}").replace("cash = 1_000_000", between)).unwrap();
     let sweep = scene.json("sweep train.toml");
     assert_eq!(sweep["best"][0]["values"], window["chosen"]["values"]);
     assert_eq!(sweep["best"][0]["value"], window["chosen"]["value"]);
