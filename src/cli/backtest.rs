@@ -71,9 +71,8 @@ impl Run {
 }
 
 /// The strategy of `file`.
-fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
-    let mut table: toml::Table = file.strategy_settings()?;
-    table.insert("kind".to_owned(), toml::Value::String(file.strategy.clone()));
+pub(super) fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
+    let table = strategy_table(file)?;
     let built = strategies::build(&table).and_then(|strategy| {
         let instruments: Vec<Instrument> = file.instruments.iter().map(Instrument::from).collect();
         strategies::check_instruments(&table, &instruments).map(|()| strategy)
@@ -81,8 +80,15 @@ fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
     built.map_err(|error| explained_strategy(file, &error))
 }
 
+/// `[strategy]` of `file`, its `kind` with it.
+pub(super) fn strategy_table(file: &RunFile) -> Result<toml::Table, InputError> {
+    let mut table: toml::Table = file.strategy_settings()?;
+    table.insert("kind".to_owned(), toml::Value::String(file.strategy.clone()));
+    Ok(table)
+}
+
 /// The error of a strategy at its place in the run.
-fn explained_strategy(file: &RunFile, error: &StrategyError) -> InputError {
+pub(super) fn explained_strategy(file: &RunFile, error: &StrategyError) -> InputError {
     let text = error.to_string();
     let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
     let message = message.trim_start_matches("[strategy] ");

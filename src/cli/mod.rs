@@ -3,6 +3,7 @@
 //! Results go to standard output; progress and what went wrong go to standard error. Exit codes: 0 done, 1 a finding the
 //! caller asked to fail on, 2 bad input, 3 a bug.
 
+mod audit;
 mod backtest;
 mod calibrate;
 mod case;
@@ -15,6 +16,8 @@ mod mechanisms;
 mod prove;
 mod screen;
 mod stop;
+mod sweep;
+mod walk_forward;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -52,6 +55,9 @@ enum Command {
     Diagnose(diagnose::Diagnose),
     Calibrate(calibrate::Calibrate),
     Backtest(backtest::Run),
+    Audit(audit::Look),
+    Sweep(sweep::Try),
+    WalkForward(walk_forward::Walk),
     Mechanisms(mechanisms::Mechanisms),
     Prove(prove::Prove),
     Data(data::Data),
@@ -92,6 +98,9 @@ impl Command {
             Self::Diagnose(command) => command.run(screen),
             Self::Calibrate(command) => command.run(screen),
             Self::Backtest(command) => command.run(screen),
+            Self::Audit(command) => command.run(screen),
+            Self::Sweep(command) => command.run(screen),
+            Self::WalkForward(command) => command.run(screen),
             Self::Mechanisms(command) => command.run(screen),
             Self::Prove(command) => command.run(screen),
             Self::Data(command) => command.run(screen),

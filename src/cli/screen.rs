@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::stop::Stop;
 use crate::io::InputError;
+use crate::report::Listing;
 
 /// Columns of text where there is no terminal to ask.
 const DEFAULT_WIDTH: u16 = 110;
@@ -45,12 +46,27 @@ impl Screen {
 
     /// A table with these heads over its columns; those that begin with `>` hold numbers and are aligned right.
     pub fn table<const N: usize>(&self, heads: [&str; N]) -> Table {
+        self.table_of(&heads)
+    }
+
+    /// A table as a report lists it.
+    pub fn listing(&self, listing: &Listing) -> Table {
+        let aligned = listing.heads.iter().zip(listing.numbers());
+        let heads: Vec<String> = aligned.map(|(head, number)| format!("{}{head}", if number { ">" } else { "" })).collect();
+        let mut table = self.table_of(&heads.iter().map(String::as_str).collect::<Vec<_>>());
+        listing.rows.iter().for_each(|row| {
+            table.add_row(row);
+        });
+        table
+    }
+
+    fn table_of(&self, heads: &[&str]) -> Table {
         let mut table = Table::new();
         table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(self.width);
         for component in [TableComponent::HeaderLines, TableComponent::MiddleHeaderIntersections] {
             table.set_style(component, '\u{2500}');
         }
-        table.set_header(heads.map(|head| Cell::new(head.trim_start_matches('>'))));
+        table.set_header(heads.iter().map(|head| Cell::new(head.trim_start_matches('>'))));
         for (column, head) in table.column_iter_mut().zip(heads) {
             if head.starts_with('>') {
                 column.set_cell_alignment(CellAlignment::Right);

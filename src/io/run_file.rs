@@ -17,6 +17,7 @@ use super::feed_format::{FeedFormat, check_file, zone};
 use super::instrument_entry::{InstrumentEntry, check_instruments};
 use super::quantity::{MechanismEntry, check_mechanisms};
 use super::stamp::Stamp;
+use super::sweep_section::{SweepSection, SweepTable};
 use super::table::Renames;
 use super::time_format::TimeUnit;
 use super::twin_file::AssumedPrice;
@@ -36,6 +37,8 @@ pub struct RunFile {
     pub strategy: String,
     /// `[[mechanism]]`: what stands between decision and fill.
     pub mechanisms: Vec<MechanismEntry>,
+    /// `[sweep]`: which values of all that are tried. A backtest has no use for it.
+    pub sweep: Option<SweepSection>,
 }
 
 /// `[run]`.
@@ -114,6 +117,7 @@ struct RunTable {
     strategy: StrategyKind,
     #[serde(default)]
     mechanism: Vec<MechanismEntry>,
+    sweep: Option<SweepTable>,
     /// Read by whoever knows what they mean.
     #[serde(rename = "matching")]
     _matching: Option<IgnoredAny>,
@@ -162,8 +166,8 @@ impl RunFile {
     }
 
     /// The run of a document; the files it names are neither looked for nor resolved.
-    fn parse(document: Document) -> Result<Self, InputError> {
-        let RunTable { run, instrument, data, strategy, mechanism, .. } = document.parse()?;
+    pub(super) fn parse(document: Document) -> Result<Self, InputError> {
+        let RunTable { run, instrument, data, strategy, mechanism, sweep, .. } = document.parse()?;
         if !run.cash.is_finite() || run.cash < 0.0 {
             let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
             return Err(error.found(run.cash).hint("it is what the run starts with"));
@@ -195,7 +199,11 @@ impl RunFile {
             let message = format!("there are {} of `{}` already", data[index].kind.word(), data[index].symbol);
             return Err(document.error(&["data", &index.to_string()], message).hint("join the files into one"));
         }
-        Ok(Self { document, run, instruments: instrument, data, strategy: strategy.kind, mechanisms: mechanism })
+        let sweep = sweep.map(|table| SweepSection::of(&document, table)).transpose()?;
+        let strategy = strategy.kind;
+        let run = Self { document, run, instruments: instrument, data, strategy, mechanisms: mechanism, sweep };
+        run.sweep.iter().try_for_each(|sweep| run.check_sweep(sweep))?;
+        Ok(run)
     }
 
     /// The document.

@@ -4,13 +4,10 @@ use rand::RngExt;
 
 use crate::sim2real::{Assembly, Seed, Timestamp, Violation};
 
+use super::audit::{Change, Trace, difference, known_times, trace, with_future};
 use super::{
-    Backtest, BacktestError, Bar, Cash, Execution, History, Instrument, Level, MECHANISMS, Price, Quotes, Request, Settings,
-    Strategy,
+    Backtest, BacktestError, Bar, Cash, Execution, History, Instrument, Level, MECHANISMS, Price, Quotes, Settings, Strategy,
 };
-
-/// What a strategy asked for, and when.
-type Decision = (Timestamp, Request);
 
 /// Runs the contract of [`Strategy`] on the strategies `make` gives, each fresh: on random bars and quotes of two
 /// instruments it must decide the same twice; and when all that becomes known after some instant is changed, or cut off,
@@ -44,102 +41,31 @@ where
     const CUTS: usize = 8;
     let subject = make(backtest.histories()).name().to_owned();
     let fail = |what: String| Violation { subject: subject.clone(), what };
-    let decide = |backtest: &Backtest| {
-        decisions(backtest, make(backtest.histories()).as_mut())
-            .map_err(|error| fail(format!("the backtest fails: {error}")))
+    let run = |backtest: &Backtest| -> Result<Trace, Violation> {
+        let trace = trace(&|backtest, strategy| backtest.run(strategy), backtest, make(backtest.histories()).as_mut());
+        match &trace.record {
+            Ok(_) => Ok(trace),
+            Err(error) => Err(fail(format!("the backtest fails: {error}"))),
+        }
     };
-    let as_it_was = decide(backtest)?;
-    if decide(backtest)? != as_it_was {
+    let as_it_was = run(backtest)?;
+    if run(backtest)?.decisions != as_it_was.decisions {
         return Err(fail("two runs on the same data decide differently".into()));
     }
     let times = known_times(backtest.histories());
     for cut in 1..=CUTS {
         let now = times[(times.len() - 1) * cut / (CUTS + 1)];
-        let before = |all: &[Decision]| -> Vec<Decision> { all.iter().take_while(|d| d.0 <= now).copied().collect() };
-        let expected = before(&as_it_was);
-        for (what, changed) in [
-            ("changed", futures(backtest, |h, k| change(h, now, seed, k))),
-            ("cut off", futures(backtest, |h, _| cut_off(h, now))),
-        ] {
-            let changed = changed.map_err(|error| fail(error.to_string()))?;
-            let found = before(&decide(&changed)?);
-            if found != expected {
-                let first = found.iter().zip(&expected).position(|(a, b)| a != b).unwrap_or(found.len().min(expected.len()));
-                let at = [&expected, &found].into_iter().filter_map(|all| all.get(first)).map(|d| d.0).min().unwrap_or(now);
+        for change in Change::ALL {
+            let changed = with_future(backtest, now, change, seed).map_err(|error| fail(error.to_string()))?;
+            if let Some(found) = difference(&as_it_was, &run(&changed)?, now, backtest.instruments()) {
+                let (subject, at, how) = (found.subject.word(), found.time, change.words());
                 return Err(fail(format!(
-                    "its decision at {at} changes when what is known after {now} is {what}: it saw the future"
+                    "its {subject} at {at} changes when what is known after {now} is {how}: it saw the future"
                 )));
             }
         }
     }
     Ok(())
-}
-
-/// All that `strategy` asks for in a run of `backtest`, refused or not.
-fn decisions(backtest: &Backtest, strategy: &mut dyn Strategy) -> Result<Vec<Decision>, BacktestError> {
-    struct Recorder<'a> {
-        inner: &'a mut dyn Strategy,
-        decisions: Vec<Decision>,
-    }
-    impl Strategy for Recorder<'_> {
-        fn name(&self) -> &str {
-            self.inner.name()
-        }
-        fn lookback(&self) -> usize {
-            self.inner.lookback()
-        }
-        fn on_event(&mut self, view: &super::View<'_>, orders: &mut super::Orders) {
-            self.inner.on_event(view, orders);
-            self.decisions.extend(orders.requests().iter().map(|request| (view.now(), *request)));
-        }
-    }
-    let mut recorder = Recorder { inner: strategy, decisions: Vec::new() };
-    backtest.run(&mut recorder)?;
-    Ok(recorder.decisions)
-}
-
-fn known_times(histories: &[History]) -> Vec<Timestamp> {
-    let mut times: Vec<Timestamp> = histories
-        .iter()
-        .flat_map(|h| h.bars().iter().map(|bar| bar.known_at).chain(h.quotes().times().iter().copied()))
-        .collect();
-    times.sort_unstable();
-    times
-}
-
-fn futures(backtest: &Backtest, future: impl Fn(&History, usize) -> History) -> Result<Backtest, BacktestError> {
-    backtest.on(backtest.histories().iter().enumerate().map(|(k, history)| future(history, k)).collect())
-}
-
-fn cut_off(history: &History, now: Timestamp) -> History {
-    history.within(Timestamp::MIN, now)
-}
-
-/// The same history with all that is known after `now` made up anew; an open before `now` had been seen and stays.
-fn change(history: &History, now: Timestamp, seed: Seed, number: usize) -> History {
-    let mut rng = seed.child("another future").stream(&number.to_string());
-    let mut factor = || 0.5 + rng.random::<f64>();
-    let mut bars = history.bars().to_vec();
-    for bar in bars.iter_mut().filter(|bar| bar.known_at > now) {
-        let close = scaled(bar.close, factor());
-        let open = if bar.open_at < now { bar.open } else { scaled(bar.open, factor()) };
-        *bar = Bar { open, close, high: open.max(close), low: open.min(close), volume: bar.volume * factor(), ..*bar };
-    }
-    let all = history.quotes().all();
-    let mut quotes = Quotes::with_depth(history.quotes().depth());
-    for quote in (0..all.len()).map_while(|k| all.get(k)) {
-        let factor = if quote.time > now { factor() } else { 1.0 };
-        let moved = |levels: &[Level]| -> Vec<Level> {
-            levels.iter().map(|level| Level { price: level.price * factor, size: level.size }).collect()
-        };
-        quotes.push(quote.time, &moved(quote.bids), &moved(quote.asks));
-    }
-    // What it was made of was a history, and prices stay above 0 and in order.
-    History::new(bars, quotes).unwrap_or_default()
-}
-
-fn scaled(price: Price, factor: f64) -> Price {
-    Price(((price.0 as f64 * factor) as i64).max(1))
 }
 
 /// Bars of a random walk with nights between, and quotes or none.

@@ -1,18 +1,20 @@
 //! What is known of one instrument's market over time.
 
+use std::sync::Arc;
+
 use crate::sim2real::Timestamp;
 
 use super::{Bar, DepthChange, OrderEvent, Price, Print, Quotes};
 
 /// Bars and quotes of one instrument, in the order in which they could be known. It was made by its own checks, so that
-/// what reads it need not check again.
+/// what reads it need not check again. A clone shares them: many runs on the same data hold them once.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct History {
-    bars: Vec<Bar>,
-    quotes: Quotes,
-    prints: Vec<Print>,
-    depth: Vec<DepthChange>,
-    orders: Vec<OrderEvent>,
+    bars: Arc<Vec<Bar>>,
+    quotes: Arc<Quotes>,
+    prints: Arc<Vec<Print>>,
+    depth: Arc<Vec<DepthChange>>,
+    orders: Arc<Vec<OrderEvent>>,
 }
 
 /// A history that cannot be.
@@ -76,7 +78,7 @@ impl History {
     pub fn new(bars: Vec<Bar>, quotes: Quotes) -> Result<Self, HistoryError> {
         check_bars(&bars)?;
         check_quotes(&quotes)?;
-        Ok(Self { bars, quotes, ..Self::default() })
+        Ok(Self { bars: Arc::new(bars), quotes: Arc::new(quotes), ..Self::default() })
     }
 
     /// Its bars, oldest first.
@@ -108,7 +110,7 @@ impl History {
     /// Its bars alone, oldest first.
     #[must_use]
     pub fn into_bars(self) -> Vec<Bar> {
-        self.bars
+        Arc::unwrap_or_clone(self.bars)
     }
 
     /// Its quotes, oldest first.
@@ -138,19 +140,19 @@ impl History {
     /// The same with trades.
     #[must_use]
     pub fn with_prints(self, prints: Vec<Print>) -> Self {
-        Self { prints, ..self }
+        Self { prints: Arc::new(prints), ..self }
     }
 
     /// The same with changes of the book by price.
     #[must_use]
     pub fn with_depth(self, depth: Vec<DepthChange>) -> Self {
-        Self { depth, ..self }
+        Self { depth: Arc::new(depth), ..self }
     }
 
     /// The same with what happened to the orders in the book.
     #[must_use]
     pub fn with_order_events(self, orders: Vec<OrderEvent>) -> Self {
-        Self { orders, ..self }
+        Self { orders: Arc::new(orders), ..self }
     }
 
     /// These bars with the quotes of `other`: each was checked when it was made.
@@ -169,7 +171,7 @@ impl History {
         for quote in (from..all.len()).map_while(|k| all.get(k)).take_while(|quote| quote.time <= end) {
             quotes.push(quote.time, quote.bids, quote.asks);
         }
-        Self { bars, quotes, ..Self::default() }
+        Self { bars: Arc::new(bars), quotes: Arc::new(quotes), ..Self::default() }
     }
 }
 

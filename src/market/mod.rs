@@ -1,6 +1,7 @@
 //! Markets: what is traded, the backtest that trades it, and `execution`, the plant every order meets.
 
 mod agenda;
+mod audit;
 mod backtest;
 mod bar;
 mod blotter;
@@ -47,6 +48,8 @@ mod run_needs;
 mod run_page;
 mod session;
 mod strategy;
+#[cfg(feature = "io")]
+pub mod sweep;
 mod tape;
 #[cfg(feature = "io")]
 mod tape_file;
@@ -55,7 +58,13 @@ mod transit;
 #[cfg(feature = "io")]
 mod twin;
 mod venue;
+#[cfg(feature = "io")]
+pub mod walk_forward;
 
+pub use audit::{
+    Audit, AuditSettings, AuditVerdict, Change, Cut, Difference, Engine, FillFault, Impossible, KnownEarly, Subject, audit,
+    audit_engine,
+};
 pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 pub use bar::Bar;
 pub use blotter::{Blotter, Fill, FillCost, Order, Rejection, Status, Why};

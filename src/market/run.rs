@@ -28,9 +28,8 @@ pub struct PreparedRun {
 /// have; mechanisms, keys, units or values the registry does not know, or that need data there are none of; and what
 /// [`History::read_bars`] and [`History::read_quotes`] refuse.
 pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
-    let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     // What needs no data is said before they are read.
-    let venue = venue(run)?;
+    venue(run)?;
     let mut inputs = vec![own_document(run)?];
     let mut read = Vec::new();
     for (index, entry) in run.data.iter().enumerate() {
@@ -39,8 +38,27 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
         inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: Some(rows) });
         read.push(Some(history));
     }
-    let joined = instruments.iter().enumerate().map(|(index, instrument)| joined(run, index, &instrument.symbol, &mut read));
+    let joined = run.instruments.iter().enumerate().map(|(index, entry)| joined(run, index, &entry.symbol, &mut read));
     let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
+    let backtest = set_up(run, histories)?;
+    let venue = backtest.venue();
+    let provenance = Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: run.run.seed,
+        currency: run.run.currency.clone(),
+        strategy: run.strategy.clone(),
+        mechanisms: venue.modelled().into_iter().map(str::to_owned).collect(),
+        reference: backtest.settings().reference.unwrap_or_else(|| Reference::suiting(venue)),
+        zone: zone(run),
+        inputs,
+    };
+    Ok(PreparedRun { backtest, provenance })
+}
+
+/// The backtest of `run` on data that were read.
+fn set_up(run: &RunFile, histories: Vec<History>) -> Result<Backtest, InputError> {
+    let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
+    let venue = venue(run)?;
     run_needs::check(run, &venue, &instruments, &histories)?;
     let cash = Cash::nearest(run.run.cash).map_err(|error| money(run, &["run", "cash"], &error))?;
     let borrowing_nothing = Settings::with_cash(cash);
@@ -52,21 +70,18 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
         matching: run.matching::<Matching>()?,
         latencies: run.latency::<Latencies>()?,
     };
-    let provenance = Provenance {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        seed: run.run.seed,
-        currency: run.run.currency.clone(),
-        strategy: run.strategy.clone(),
-        mechanisms: venue.modelled().into_iter().map(str::to_owned).collect(),
-        reference: settings.reference.unwrap_or_else(|| Reference::suiting(&venue)),
-        zone: zone(run),
-        inputs,
-    };
-    let backtest = Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))?;
-    Ok(PreparedRun { backtest, provenance })
+    Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))
 }
 
 impl PreparedRun {
+    /// The backtest of `run`, which has other values but the same data: these are shared, not read again.
+    ///
+    /// # Errors
+    /// As [`prepare_run`], but for what it says of files.
+    pub fn variant(&self, run: &RunFile) -> Result<Backtest, InputError> {
+        set_up(run, self.backtest.histories().to_vec())
+    }
+
     /// All that `record`, the record of this backtest, is shown as.
     ///
     /// # Errors

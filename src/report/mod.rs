@@ -14,6 +14,7 @@ mod proof;
 pub(crate) mod quantity;
 mod section;
 mod sections;
+mod sweep;
 
 pub use backtest::{BacktestPage, Cost, Exposure, Fall, FigureGroup, Fill, InForce, Input, Metric, MonthReturn, Trade};
 pub use diagnosis::diagnosis_page;
@@ -21,3 +22,4 @@ pub use figures::{Abscissa, DiagnosisFigures, Trace};
 pub use page::{Badge, Page, Tone};
 pub use proof::{ConfusionTable, ProofFailure, ProofFigure, ProofPage};
 pub use section::{ReportError, Section};
+pub use sweep::{HeatMap, Listing, Scatter, SweepPage, WalkForwardPage};
