@@ -159,9 +159,11 @@ pub(super) fn make(file: &RunFile) -> Result<Box<dyn Strategy>, Refused> {
         StrategyError::Value { .. } => {
             Refused::Invalid(error.to_string().replace("\nhint: ", ": ").replace("[strategy] ", ""))
         }
-        StrategyError::NoKind(_) | StrategyError::Unknown { .. } | StrategyError::Parameter { .. } => {
-            Refused::Input(explained_strategy(file, &error))
-        }
+        StrategyError::NoKind(_)
+        | StrategyError::Unknown { .. }
+        | StrategyError::Parameter { .. }
+        | StrategyError::Symbol { .. }
+        | StrategyError::TooFew { .. } => Refused::Input(explained_strategy(file, &error)),
     })
 }
 

@@ -4,7 +4,7 @@ use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
 use super::{
-    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, Matching, MoneyError, Reference,
+    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, Matching, MoneyError, QueueModel, Reference,
     Session, Strategy,
 };
 

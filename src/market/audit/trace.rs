@@ -5,7 +5,8 @@ use std::sync::Mutex;
 use serde::Serialize;
 
 use crate::market::{
-    Backtest, BacktestError, EquityPoint, Fill, Instrument, Orders, Record, Rejection, Request, Side, Strategy, View,
+    Backtest, BacktestError, EquityPoint, Fill, Instrument, OrderKind, Orders, Price, Record, Rejection, Request, Side, Strategy,
+    View,
 };
 use crate::sim2real::Timestamp;
 
@@ -152,10 +153,29 @@ impl Happened for Decision {
         self.time
     }
     fn instrument(&self) -> Option<usize> {
-        Some(self.request.instrument)
+        match self.request {
+            Request::Submit(_, ticket) => Some(ticket.instrument),
+            Request::Cancel(_) | Request::Replace { .. } | Request::Wake(_) => None,
+        }
     }
     fn shown(&self) -> String {
-        sided(self.request.side, self.request.quantity)
+        let price = |price: Price| format!(" at {}", price.to_f64());
+        match self.request {
+            Request::Submit(_, ticket) => {
+                let at = ticket.kind.limit().or(ticket.kind.trigger()).map(price).unwrap_or_default();
+                let kind = match ticket.kind {
+                    OrderKind::Market => String::new(),
+                    kind => format!(" ({})", kind.word().replace('_', " ")),
+                };
+                format!("{}{at}{kind}", sided(ticket.side, ticket.quantity))
+            }
+            Request::Cancel(id) => format!("cancel order {}", id.0),
+            Request::Replace { id, quantity, price: to } => {
+                let quantity = quantity.map(|q| format!(" {}", q.to_f64())).unwrap_or_default();
+                format!("replace order {}:{quantity}{}", id.0, to.map(price).unwrap_or_default())
+            }
+            Request::Wake(time) => format!("wake at {time}"),
+        }
     }
     fn same(&self, other: &Self) -> bool {
         self == other

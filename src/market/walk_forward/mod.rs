@@ -19,7 +19,7 @@ use toml::Value;
 use crate::io::{InputError, OutputTable, SweepSection, WalkForwardSection};
 use crate::sim2real::Timestamp;
 
-use super::metric::{Drawdown, Metrics, Returns};
+use super::metric::{Drawdown, Drawdowns, Metrics, Returns};
 use super::sweep::{Outcome, Refused, Sweep, Trial, Values, best, column, figures};
 use super::{Backtest, Cash, EquityPoint, History, InputFile, Record, Settings};
 
@@ -204,7 +204,7 @@ impl OutOfSample {
             final_equity: last,
             total_return: (initial > 0.0).then(|| last / initial - 1.0),
             returns: Returns::of(equity),
-            max_drawdown: Drawdown::deepest(initial, equity),
+            max_drawdown: Drawdowns::of(initial, equity).deepest.first().copied(),
             fills,
         }
     }
@@ -258,7 +258,7 @@ fn tested(
     };
     let shown = warm_up::warmed(histories, window, strategy.lookback());
     let ran = sweep.backtest(&run, values, Some(&shown))?.and_then(|backtest| {
-        let settings = Settings { cash, ..*backtest.settings() };
+        let settings = Settings { cash, ..backtest.settings().clone() };
         let (instruments, venue) = (backtest.instruments().to_vec(), backtest.venue().clone());
         let backtest = Backtest::new(instruments, shown, venue, settings).map_err(|error| error.to_string())?;
         let warmed = &mut warm_up::Warmed { inner: strategy.as_mut(), from: window.test_start };
