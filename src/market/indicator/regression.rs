@@ -82,18 +82,19 @@ mod tests {
     fn ten_million_updates_leave_no_drift() {
         let mut regression = Regression::new(Period::new(30).unwrap());
         let mut state = 1_u64;
-        let mut last = [(0_i64, 0_i64); 30];
+        let mut last = [(0.0, 0.0); 30];
         for k in 0..10_000_000_usize {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let x = 5_000_000 + (state >> 59) as i64;
-            let y = 2 * x + ((state >> 50) & 15) as i64;
+            let x = (5_000_000 + (state >> 59)) as f64 * 0.01;
+            let y = 2.0 * x + ((state >> 50) & 15) as f64 * 0.01;
             last[k % 30] = (x, y);
-            regression.update((x as f64, y as f64));
+            regression.update((x, y));
         }
-        let sum = |of: fn(&(i64, i64)) -> i64| last.iter().map(of).sum::<i64>();
-        let (x, y) = (sum(|p| p.0), sum(|p| p.1));
-        let (xx, xy) = (30 * sum(|p| p.0 * p.0) - x * x, 30 * sum(|p| p.0 * p.1) - x * y);
-        let error = (regression.value().unwrap().slope / (xy as f64 / xx as f64) - 1.0).abs();
+        let mean = |of: fn(&(f64, f64)) -> f64| last.iter().map(of).sum::<f64>() / 30.0;
+        let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+        let sum = |of: &dyn Fn(&(f64, f64)) -> f64| last.iter().map(of).sum::<f64>();
+        let slope = sum(&|p| (p.0 - x) * (p.1 - y)) / sum(&|p| (p.0 - x).powi(2));
+        let error = (regression.value().unwrap().slope / slope - 1.0).abs();
         assert!(error < 1e-9, "{error:e}");
     }
 }

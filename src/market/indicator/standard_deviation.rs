@@ -107,20 +107,20 @@ mod tests {
         assert_eq!(deviation.update(0.1), Some(0.0));
     }
 
-    /// A price of about 60,000 with ticks of 0.01, ten million times.
+    /// A price of about 60,000 with ticks of 0.01, which no float is, ten million times.
     #[test]
     fn ten_million_updates_leave_no_drift() {
         let mut deviation = StandardDeviation::new(Period::new(20).unwrap());
         let mut state = 1_u64;
-        let mut last = [0_i64; 20];
+        let mut last = [0.0; 20];
         for k in 0..10_000_000_usize {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let ticks = 6_000_000 + (state >> 61) as i64;
-            last[k % 20] = ticks;
-            deviation.update(ticks as f64);
+            let price = (6_000_000 + (state >> 61)) as f64 * 0.01;
+            last[k % 20] = price;
+            deviation.update(price);
         }
-        let (sum, squares) = last.iter().fold((0_i64, 0_i64), |(s, q), x| (s + x, q + x * x));
-        let variance = (20 * squares - sum * sum) as f64 / 400.0;
+        let mean = last.iter().sum::<f64>() / 20.0;
+        let variance = last.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 20.0;
         let error = (deviation.variance().unwrap() / variance - 1.0).abs();
         assert!(error < 1e-9, "{error:e}");
     }
