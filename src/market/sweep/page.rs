@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use toml::Value;
+
 use crate::io::{SweepGoal, SweepSection};
 use crate::report::quantity::{UNDEFINED, number as rounded};
 use crate::report::{HeatMap, Listing, Scatter, SweepPage};
@@ -53,7 +55,7 @@ impl SweepSummary {
         said.extend(self.reasons.iter().map(|(why, count)| format!("{count} times: {why}.")));
         said.push(match self.deflated_sharpe {
             Some(part) => format!("The deflated Sharpe ratio of the best is {}: the probability that it is more than the luck of so many runs.", rounded(part)),
-            None => format!("The best of {} runs is better than it will be again: it was chosen for it. No deflated Sharpe ratio was computed; try it on data that no run has seen, as `trueup walk-forward` does.", self.runs),
+            None => format!("The best of {} runs is better than it will be again: it was chosen for it. No deflated Sharpe ratio was computed; try it on data that no run has seen, as trueup walk-forward does.", self.runs),
         });
         said
     }
@@ -106,8 +108,8 @@ fn heat(section: &SweepSection, trials: &[Trial]) -> Option<HeatMap> {
         across,
         metric: section.metric.clone(),
         larger_is_better: section.goal == SweepGoal::Max,
-        rows: rows.iter().map(|value| rounded(*value)).collect(),
-        columns: columns.iter().map(|value| rounded(*value)).collect(),
+        rows: rows.iter().map(|value| shown(&Value::Float(*value))).collect(),
+        columns: columns.iter().map(|value| shown(&Value::Float(*value))).collect(),
         cells: (0..rows.len()).map(row).collect(),
     })
 }

@@ -75,18 +75,18 @@ impl WalkForward {
         let paths = self.paths();
         let day = |time: Timestamp| DateTime::from_timestamp_nanos(time.0).format("%Y-%m-%d %H:%M").to_string();
         let heads = ["train from", "to", "test from", "to"].iter().map(|head| (*head).to_owned());
-        let figures = [format!("{} in sample", self.metric), "out of sample".to_owned(), "return".to_owned()];
+        let mut figures = vec![format!("{} in sample", self.metric), "out of sample".to_owned()];
+        // The return is the metric often enough.
+        let others = ["total_return"].into_iter().filter(|name| *name != self.metric);
+        figures.extend(others.clone().map(str::to_owned));
         let row = |step: &Step| {
             let window = &step.window;
             let times = [window.train_start, window.train_end, window.test_start, window.test_end].map(day);
             let chosen = step.chosen.as_ref();
             let values = paths.iter().map(|path| chosen.and_then(|chosen| chosen.values.get(path)).map(shown));
-            let figures = [
-                chosen.map(|chosen| chosen.value),
-                step.out_of_sample.get(&self.metric).copied(),
-                step.out_of_sample.get("total_return").copied(),
-            ];
-            let all = values.chain(figures.map(|figure| figure.map(number)));
+            let tested = |name: &str| step.out_of_sample.get(name).copied();
+            let figures = [chosen.map(|chosen| chosen.value), tested(&self.metric)];
+            let all = values.chain(figures.into_iter().chain(others.clone().map(tested)).map(|figure| figure.map(number)));
             times.into_iter().chain(all.map(|cell| cell.unwrap_or_else(|| UNDEFINED.to_owned()))).collect()
         };
         Listing {

@@ -21,14 +21,16 @@ impl Section for HeatMapTable<'_> {
 
     fn render(&self) -> Result<String, ReportError> {
         let Some(heat) = self.heat else { return Ok(String::new()) };
-        let all = heat.cells.iter().flatten().flatten().copied().filter(|v| v.is_finite());
-        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-        if low > high {
+        // By rank: one run far off must not make all others look alike.
+        let mut all: Vec<f64> = heat.cells.iter().flatten().flatten().copied().filter(|v| v.is_finite()).collect();
+        if all.is_empty() {
             return Ok(String::new());
         }
+        all.sort_by(f64::total_cmp);
+        let last = (all.len() - 1).max(1) as f64;
         let strength = |value: f64| {
-            let part = if high > low { (value - low) / (high - low) } else { 1.0 };
-            (100.0 * if heat.larger_is_better { part } else { 1.0 - part }).round()
+            let part = all.partition_point(|other| *other < value) as f64 / last;
+            (55.0 * if heat.larger_is_better { part } else { 1.0 - part }).round()
         };
         let cell = |value: &Option<f64>| match value.filter(|v| v.is_finite()) {
             Some(value) => context! { text => number(value), strength => strength(value) },
