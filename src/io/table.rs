@@ -339,11 +339,15 @@ impl Table {
         let hole = cells.iter().position(Option::is_none);
         match hole {
             None => Ok(cells.into_iter().flatten().collect()),
-            Some(row) => Err(self
-                .error(name, row, format!("expected {what}"))
-                .found(self.hole(name, row))
-                .hint("this column must be complete: fill the cell or drop the row")),
+            Some(row) => Err(self.missing(name, row, what)),
         }
+    }
+
+    /// The error of a cell that has no value, in a column that must be complete: `what` was expected there.
+    #[must_use]
+    pub fn missing(&self, name: &str, row: usize, what: &str) -> InputError {
+        let hint = "this column must be complete: fill the cell or drop the row";
+        self.error(name, row, format!("expected {what}")).found(self.hole(name, row)).hint(hint)
     }
 }
 

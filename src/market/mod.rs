@@ -7,6 +7,7 @@ mod book;
 mod check;
 mod covariate;
 mod daily;
+mod data_notes;
 mod depth;
 mod execution;
 mod feed;
@@ -26,6 +27,7 @@ mod order_log;
 mod own_print;
 mod price_assumption;
 mod quote;
+mod row_check;
 #[cfg(feature = "io")]
 mod run;
 #[cfg(feature = "io")]
@@ -49,6 +51,7 @@ pub use blotter::{Blotter, Fill, FillCost, Order, Reason, Rejection, Status};
 pub use book::{Book, Level, Walk};
 pub use check::{check_strategy, check_strategy_on};
 pub use daily::Daily;
+pub use data_notes::{DataNotes, Finding, Treatment};
 pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
 pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
 pub use feed::Feed;
