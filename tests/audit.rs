@@ -169,6 +169,14 @@ fn at_the_same_close(backtest: &Backtest, strategy: &mut dyn Strategy) -> Result
         fee: Cash::default(),
         realised: None,
         cost: FillCost::default(),
+        why: trueup::market::Why {
+            role: trueup::market::Role::Taker,
+            data: trueup::market::EventKind::Bar,
+            row: 0,
+            met: 0.0,
+            band: [order.decision_price; 2],
+            queued_behind: 0.0,
+        },
     };
     record.blotter.fills = record.blotter.orders.iter().map(fill).collect();
     Ok(record)

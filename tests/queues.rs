@@ -47,7 +47,7 @@ fn trades_use_up_the_queue_and_then_reach_the_order() {
         print(55, 99.0, 3.0, Side::Sell),
         print(65, 98.99, 1.0, Side::Sell),
     ];
-    let history = quotes(&rows).with_prints(prints);
+    let history = quotes(&rows).with_prints(prints).unwrap();
     let record = run(history, &[], event(0).submit(limit(Side::Buy, 40.0, 99.0)));
     assert_eq!(fills(&record), [(45, 15.0, 99.0), (55, 3.0, 99.0), (65, 22.0, 99.0)]);
     let why = record.blotter.fills[0].why;
@@ -56,12 +56,9 @@ fn trades_use_up_the_queue_and_then_reach_the_order() {
 
 #[test]
 fn an_order_inside_the_spread_has_nobody_ahead() {
-    let history = quotes(&[(0, 99.0, 101.0), (10, 99.0, 101.0), (20, 99.0, 101.0)]).with_prints(vec![print(
-        15,
-        100.0,
-        3.0,
-        Side::Sell,
-    )]);
+    let history = quotes(&[(0, 99.0, 101.0), (10, 99.0, 101.0), (20, 99.0, 101.0)])
+        .with_prints(vec![print(15, 100.0, 3.0, Side::Sell)])
+        .unwrap();
     let record = run(history, &[], event(0).submit(limit(Side::Buy, 5.0, 100.0)));
     assert_eq!(fills(&record), [(15, 3.0, 100.0)]);
 }
@@ -76,7 +73,7 @@ fn what_is_cancelled_is_shared_by_the_model_of_the_queue() {
         (30, 99.0, 100.0, 101.0, 1.0),
     ];
     let of = |queue| {
-        let history = sized_quotes(&rows).with_prints(vec![print(25, 99.0, 60.0, Side::Sell)]);
+        let history = sized_quotes(&rows).with_prints(vec![print(25, 99.0, 60.0, Side::Sell)]).unwrap();
         fills(&run_with(vec![history], &[], by_queue(queue), event(0).submit(limit(Side::Buy, 50.0, 99.0))))
     };
     assert_eq!(of(QueueModel::Proportional), [(25, 10.0, 99.0)]);
@@ -93,7 +90,7 @@ fn book(changes: Vec<DepthChange>) -> History {
     let start = [(Side::Buy, 99.0, 50.0), (Side::Buy, 98.0, 70.0), (Side::Sell, 101.0, 40.0), (Side::Sell, 102.0, 80.0)];
     let mut all: Vec<DepthChange> = start.iter().map(|(side, price, size)| change(0, *side, *price, *size)).collect();
     all.extend(changes);
-    History::default().with_depth(all)
+    History::default().with_depth(all).unwrap()
 }
 
 #[test]
@@ -136,7 +133,8 @@ fn by_order_data_say_who_stood_ahead() {
         order(40, 2, OrderAction::Change, Side::Buy, 99.0, 25.0),
         order(60, 3, OrderAction::Delete, Side::Sell, 101.0, 0.0),
     ];
-    let history = History::default().with_order_events(events).with_prints(vec![print(50, 99.0, 4.0, Side::Sell)]);
+    let history =
+        History::default().with_order_events(events).unwrap().with_prints(vec![print(50, 99.0, 4.0, Side::Sell)]).unwrap();
     let record = run(history, &[], event(0).submit(limit(Side::Buy, 6.0, 99.0)));
     assert_eq!(fills(&record), [(50, 4.0, 99.0)]);
     assert_eq!(record.blotter.fills[0].why.queued_behind, 30.0);
@@ -215,7 +213,7 @@ fn random_market() -> impl Drawn<Value = History> {
                     _ => {}
                 }
             }
-            sized_quotes(&rows).with_prints(prints)
+            sized_quotes(&rows).with_prints(prints).unwrap()
         })
 }
 

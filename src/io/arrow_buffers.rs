@@ -25,10 +25,74 @@ const PAIR: usize = 16;
 
 /// Whether the buffers that an Arrow file declares lie within it, and its columns are no longer than these can hold.
 pub(super) fn buffers_agree(file: &[u8]) -> bool {
-    checked(file).is_some()
+    checked(file, file.len() as u64).is_some()
 }
 
-fn checked(file: &[u8]) -> Option<()> {
+/// The same of a [`part`] of a file of `size` bytes.
+pub(super) fn part_agrees(part: &[u8], size: u64) -> bool {
+    checked(part, size).is_some()
+}
+
+/// A message of a file and its body: where it begins, and the bytes of both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Block {
+    pub(super) offset: u64,
+    pub(super) message: u32,
+    pub(super) body: u64,
+}
+
+impl Block {
+    pub(super) fn length(self) -> u64 {
+        u64::from(self.message).saturating_add(self.body)
+    }
+}
+
+/// The blocks of dictionaries and those of record batches that a `footer` lists, where it can be read.
+pub(super) fn blocks(footer: &[u8]) -> Option<[Vec<Block>; 2]> {
+    let footer = Bytes(footer);
+    let root = footer.root()?;
+    let listed = |field| {
+        let block = |at: usize| {
+            Some(Block {
+                offset: u64::try_from(footer.i64(at)?).ok()?,
+                message: u32::try_from(footer.i32(at + 8)?).ok()?,
+                body: u64::try_from(footer.i64(at + 16)?).ok()?,
+            })
+        };
+        footer.items(root, field, BLOCK)?.map(block).collect::<Option<Vec<Block>>>()
+    };
+    let [dictionaries, batches] = FOOTER_BLOCKS.map(listed);
+    Some([dictionaries?, batches?])
+}
+
+/// A file of all dictionaries and one record batch: `bodies` are the bytes of each, in the order of `blocks`, and `footer`
+/// is that of the whole file.
+pub(super) fn part(footer: &[u8], blocks: [&[Block]; 2], bodies: &[Vec<u8>]) -> Option<Vec<u8>> {
+    // As in the whole file, the magic is filled up to a multiple of 8.
+    let mut file = b"ARROW1\0\0".to_vec();
+    let mut footer = footer.to_vec();
+    let root = Bytes(&footer).root()?;
+    let mut bodies = bodies.iter();
+    for (field, blocks) in FOOTER_BLOCKS.into_iter().zip(blocks) {
+        let places: Vec<usize> = Bytes(&footer).items(root, field, BLOCK)?.collect();
+        for (at, block) in places.into_iter().zip(blocks) {
+            footer.get_mut(at..at + 8)?.copy_from_slice(&(file.len() as u64).to_le_bytes());
+            footer.get_mut(at + 8..at + 12)?.copy_from_slice(&block.message.to_le_bytes());
+            footer.get_mut(at + 16..at + 24)?.copy_from_slice(&block.body.to_le_bytes());
+            file.extend_from_slice(bodies.next()?);
+        }
+        if let Some(list) = Bytes(&footer).field(root, field)? {
+            let count = Bytes(&footer).below(list)?;
+            footer.get_mut(count..count + 4)?.copy_from_slice(&u32::try_from(blocks.len()).ok()?.to_le_bytes());
+        }
+    }
+    file.extend_from_slice(&footer);
+    file.extend_from_slice(&u32::try_from(footer.len()).ok()?.to_le_bytes());
+    file.extend_from_slice(b"ARROW1");
+    Some(file)
+}
+
+fn checked(file: &[u8], size: u64) -> Option<()> {
     // At the end stand the footer, its length, and `ARROW1`.
     let tail = file.strip_suffix(b"ARROW1")?.len().checked_sub(4)?;
     let start = tail.checked_sub(usize::try_from(Bytes(file).i32(tail)?).ok()?)?;
@@ -39,7 +103,7 @@ fn checked(file: &[u8]) -> Option<()> {
             let offset = usize::try_from(footer.i64(at)?).ok()?;
             let length = usize::try_from(footer.i32(at + 8)?).ok()?;
             let body = file.get(offset.checked_add(length)?..)?;
-            message_agrees(Bytes(file.get(offset..offset + length)?), body, file.len() as u64)?;
+            message_agrees(Bytes(file.get(offset..offset + length)?), body, size)?;
         }
     }
     Some(())

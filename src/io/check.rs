@@ -33,18 +33,31 @@ pub fn check_increasing<T: PartialOrd + Display>(
         if holds {
             continue;
         }
-        let (than, hint) = match (value == before, increase) {
-            (true, _) => ("more than", "two rows have the same value: drop one, or write the column with more digits"),
-            (false, Increase::Strictly) => ("more than", "sort the rows by this column; was a second recording appended?"),
-            (false, Increase::OrStays) => ("at least", "sort the rows by this column; was a second recording appended?"),
-        };
-        let place = match table.place(row) {
-            Place::Row(row) => format!(" of row {row}"),
-            _ => String::new(),
-        };
-        return Err(table.error(column, row + 1, format!("expected {than} the {before}{place}")).found(value).hint(hint));
+        return Err(not_increasing(table, column, row + 1, value, (before, table.place(row)), increase));
     }
     Ok(())
+}
+
+/// The error of `value`, in a row of a column that should increase, after `before` and its place.
+#[must_use]
+pub fn not_increasing<T: PartialOrd + Display>(
+    table: &Table,
+    column: &str,
+    row: usize,
+    value: &T,
+    (before, before_at): (&T, Place),
+    increase: Increase,
+) -> InputError {
+    let (than, hint) = match (value == before, increase) {
+        (true, _) => ("more than", "two rows have the same value: drop one, or write the column with more digits"),
+        (false, Increase::Strictly) => ("more than", "sort the rows by this column; was a second recording appended?"),
+        (false, Increase::OrStays) => ("at least", "sort the rows by this column; was a second recording appended?"),
+    };
+    let place = match before_at {
+        Place::Row(row) => format!(" of row {row}"),
+        _ => String::new(),
+    };
+    table.error(column, row, format!("expected {than} the {before}{place}")).found(value).hint(hint)
 }
 
 /// Holds the values of a column to be greater than 0; holes pass.

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use chrono::{DateTime, NaiveDateTime};
 use polars::prelude::{
-    ArrowDataType, DataFrame, DataType, IpcReader, ParquetReader, PolarsResult, SerReader, Series, TimeUnit as PolarsUnit,
-    TimeZone, polars_ensure,
+    ArrowDataType, ArrowSchema, DataFrame, DataType, FileMetadata, IpcReader, ParquetReader, PolarsResult, SerReader,
+    Series, TimeUnit as PolarsUnit, TimeZone, polars_ensure,
 };
 
 use super::arrow_buffers::buffers_agree;
@@ -52,24 +52,13 @@ impl ColumnarFile {
     /// # Errors
     /// A file that is empty, truncated or corrupt, and one without rows.
     pub(super) fn read(path: &Path, file: File, container: Container) -> Result<Self, InputError> {
-        let kind = match container {
-            Container::Parquet => "Parquet",
-            Container::Arrow => "Arrow IPC",
-        };
-        let corrupt = |reason: &str| {
-            InputError::new(path, format!("expected a whole {kind} file ({})", first_line(reason)))
-                .hint("the file is truncated, corrupt or of another format: copy or write it again")
-        };
-        // The decoders panic on some corrupt bytes; a recording must not take the process with it.
-        let table = match catch_unwind(AssertUnwindSafe(|| load(file, container))) {
-            Ok(result) => result.map_err(|error| corrupt(&error.to_string()))?,
-            Err(_) => return Err(corrupt("its contents contradict each other")),
-        };
-        if table.frame.height() == 0 {
-            return Err(InputError::new(path, "the file has columns but no rows")
-                .hint("was the recording cut off before its first sample?"));
-        }
-        Ok(table)
+        let table = caught(path, container, || load(file, container))?;
+        if table.frame.height() == 0 { Err(no_rows(path)) } else { Ok(table) }
+    }
+
+    /// The rows of `frame` as a table of the file whose columns are `columns`.
+    pub(super) fn of(frame: DataFrame, columns: &Columns) -> Self {
+        Self { frame, names: columns.names.clone(), left_out: columns.left_out.clone() }
     }
 
     pub(super) fn names(&self) -> &[String] {
@@ -93,50 +82,99 @@ impl ColumnarFile {
     }
 }
 
+/// What `decode` gives, which reads from the file at `path`.
+///
+/// # Errors
+/// Whatever it refuses, and where it panics: the decoders do on some corrupt bytes, and a recording must not take the
+/// process with it.
+pub(super) fn caught<T>(
+    path: &Path,
+    container: Container,
+    decode: impl FnOnce() -> PolarsResult<T>,
+) -> Result<T, InputError> {
+    let kind = match container {
+        Container::Parquet => "Parquet",
+        Container::Arrow => "Arrow IPC",
+    };
+    let corrupt = |reason: &str| {
+        InputError::new(path, format!("expected a whole {kind} file ({})", first_line(reason)))
+            .hint("the file is truncated, corrupt or of another format: copy or write it again")
+    };
+    match catch_unwind(AssertUnwindSafe(decode)) {
+        Ok(result) => result.map_err(|error| corrupt(&error.to_string())),
+        Err(_) => Err(corrupt("its contents contradict each other")),
+    }
+}
+
+/// The error of a file without rows.
+pub(super) fn no_rows(path: &Path) -> InputError {
+    InputError::new(path, "the file has columns but no rows").hint("was the recording cut off before its first sample?")
+}
+
+/// The columns of a file.
+pub(super) struct Columns {
+    /// All of them.
+    pub(super) names: Vec<String>,
+    /// Those of types that are read.
+    pub(super) wanted: Vec<String>,
+    /// The others, and their types.
+    left_out: Vec<(String, String)>,
+}
+
+impl Columns {
+    /// The columns that `schema` names.
+    pub(super) fn of(schema: &ArrowSchema) -> Self {
+        let (mut names, mut wanted, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+        for field in schema.iter_values() {
+            let name = field.name.to_string();
+            match readable(&field.dtype) {
+                true => wanted.push(name.clone()),
+                false => left_out.push((name.clone(), type_name(&field.dtype))),
+            }
+            names.push(name);
+        }
+        Self { names, wanted, left_out }
+    }
+}
+
 fn first_line(text: &str) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
-fn load(file: File, container: Container) -> PolarsResult<ColumnarFile> {
-    let (size, mut again) = (file.metadata()?.len(), file.try_clone()?);
-    let mut parquet = None;
-    let mut arrow = None;
-    let schema = match container {
+fn load(mut file: File, container: Container) -> PolarsResult<ColumnarFile> {
+    match container {
         Container::Parquet => {
+            let (size, mut again) = (file.metadata()?.len(), file.try_clone()?);
             check_footer(&mut again, size)?;
-            parquet.insert(ParquetReader::new(file)).schema()?
+            let mut reader = ParquetReader::new(file);
+            let columns = Columns::of(&*reader.schema()?);
+            let footer = Arc::clone(reader.get_metadata()?);
+            check_rows(&footer)?;
+            for group in 0..footer.row_groups.len() {
+                check_group(&footer, group, &mut again, size)?;
+            }
+            Ok(ColumnarFile::of(reader.with_columns(Some(columns.wanted.clone())).finish()?, &columns))
         }
         Container::Arrow => {
             let mut bytes = Vec::new();
-            again.read_to_end(&mut bytes)?;
-            let bytes: Arc<[u8]> = bytes.into();
-            let schema = arrow.insert(IpcReader::new(Cursor::new(Arc::clone(&bytes)))).schema()?;
-            polars_ensure!(buffers_agree(&bytes), ComputeError: "its buffers contradict its size");
-            schema
+            file.read_to_end(&mut bytes)?;
+            let (frame, columns) = arrow_frame(bytes, buffers_agree)?;
+            Ok(ColumnarFile::of(frame, &columns))
         }
-    };
-    let (mut names, mut wanted, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
-    for field in schema.iter_values() {
-        let name = field.name.to_string();
-        match readable(&field.dtype) {
-            true => wanted.push(name.clone()),
-            false => left_out.push((name.clone(), type_name(&field.dtype))),
-        }
-        names.push(name);
     }
-    let frame = match (parquet, arrow) {
-        (Some(mut reader), _) => {
-            check_counts(&mut reader, again, size)?;
-            reader.with_columns(Some(wanted)).finish()?
-        }
-        (None, Some(reader)) => reader.with_columns(Some(wanted)).finish()?,
-        (None, None) => DataFrame::empty(),
-    };
-    Ok(ColumnarFile { frame, names, left_out })
+}
+
+/// The rows and columns of an Arrow file that `agrees` has nothing against.
+pub(super) fn arrow_frame(bytes: Vec<u8>, agrees: impl Fn(&[u8]) -> bool) -> PolarsResult<(DataFrame, Columns)> {
+    let bytes: Arc<[u8]> = bytes.into();
+    let mut reader = IpcReader::new(Cursor::new(Arc::clone(&bytes)));
+    let columns = Columns::of(&*reader.schema()?);
+    polars_ensure!(agrees(&bytes), ComputeError: "its buffers contradict its size");
+    Ok((reader.with_columns(Some(columns.wanted.clone())).finish()?, columns))
 }
 
 /// Holds the lists of a Parquet footer to its length, where there is one: it stands before its length and `PAR1`.
-fn check_footer(file: &mut File, size: u64) -> PolarsResult<()> {
+pub(super) fn check_footer(file: &mut File, size: u64) -> PolarsResult<()> {
     let mut tail = [0; 8];
     let Some(end) = size.checked_sub(8) else { return Ok(()) };
     file.seek(SeekFrom::Start(end))?;
@@ -151,25 +189,28 @@ fn check_footer(file: &mut File, size: u64) -> PolarsResult<()> {
     Ok(())
 }
 
-/// Holds the counts of a Parquet footer and of the page headers to agree with each other and with the size of the file
-/// [bytes].
-fn check_counts(reader: &mut ParquetReader<File>, mut file: File, size: u64) -> PolarsResult<()> {
-    let footer = reader.get_metadata()?;
+/// Holds the row counts of a Parquet footer to agree with each other.
+pub(super) fn check_rows(footer: &FileMetadata) -> PolarsResult<()> {
     let rows = footer.row_groups.iter().try_fold(0_usize, |sum, group| sum.checked_add(group.num_rows()));
     polars_ensure!(rows == Some(footer.num_rows), ComputeError: "its row counts contradict each other");
-    for group in &footer.row_groups {
-        for chunk in group.parquet_columns() {
-            // A column of lists has more values than rows.
-            let flat = chunk.descriptor().descriptor.max_rep_level == 0;
-            let range = chunk.byte_range();
-            let fits = range.start <= range.end && range.end <= size;
-            let counted = !flat || usize::try_from(chunk.num_values()) == Ok(group.num_rows());
-            polars_ensure!(fits && counted, ComputeError: "its footer contradicts its size");
-            let mut bytes = Vec::new();
-            file.seek(SeekFrom::Start(range.start))?;
-            (&mut file).take(range.end - range.start).read_to_end(&mut bytes)?;
-            polars_ensure!(pages_agree(&bytes, chunk.num_values()), ComputeError: "its pages contradict its footer");
-        }
+    Ok(())
+}
+
+/// Holds the counts of row group `group` of a Parquet footer and those of the page headers to agree with each other and
+/// with the size of the file [bytes].
+pub(super) fn check_group(footer: &FileMetadata, group: usize, file: &mut File, size: u64) -> PolarsResult<()> {
+    let Some(group) = footer.row_groups.get(group) else { return Ok(()) };
+    for chunk in group.parquet_columns() {
+        // A column of lists has more values than rows.
+        let flat = chunk.descriptor().descriptor.max_rep_level == 0;
+        let range = chunk.byte_range();
+        let fits = range.start <= range.end && range.end <= size;
+        let counted = !flat || usize::try_from(chunk.num_values()) == Ok(group.num_rows());
+        polars_ensure!(fits && counted, ComputeError: "its footer contradicts its size");
+        let mut bytes = Vec::new();
+        file.seek(SeekFrom::Start(range.start))?;
+        file.take(range.end - range.start).read_to_end(&mut bytes)?;
+        polars_ensure!(pages_agree(&bytes, chunk.num_values()), ComputeError: "its pages contradict its footer");
     }
     Ok(())
 }

@@ -12,12 +12,20 @@ use super::error::{InputError, Place};
 pub(super) struct CsvText {
     text: String,
     names: Vec<String>,
+    rows: Rows,
+    header_line: usize,
+}
+
+/// Where the rows of a text are, but for the header.
+struct Rows {
     /// Byte at which each row starts.
     starts: Vec<usize>,
     /// Byte after each cell, from the start of its row: 4 bytes a cell, row by row.
     ends: Vec<u32>,
     /// Line of the file on which each row starts, from 1.
     lines: Vec<usize>,
+    /// The line after the last.
+    next_line: usize,
 }
 
 impl CsvText {
@@ -26,7 +34,16 @@ impl CsvText {
     /// # Errors
     /// Bytes that are not UTF-8, an empty file, a header only, rows of different lengths, a quote that is not closed.
     pub(super) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, InputError> {
-        let mut text = decode(path, bytes)?;
+        let csv = Self::first_block(path, bytes)?;
+        if csv.rows() == 0 { Err(no_rows(path, csv.header_line)) } else { Ok(csv) }
+    }
+
+    /// Cuts the complete lines with which the file begins, the header among them; there may be no rows among them.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse), but for a header only.
+    pub(super) fn first_block(path: &Path, bytes: Vec<u8>) -> Result<Self, InputError> {
+        let mut text = decode(path, bytes, 1)?;
         if text.starts_with('\u{feff}') {
             text.drain(..'\u{feff}'.len_utf8());
         }
@@ -44,26 +61,30 @@ impl CsvText {
             header.clear();
         };
         let names: Vec<String> = (0..header.len()).map(|k| shown(cell(&text, start, &header, k)).into_owned()).collect();
-        let (mut starts, mut ends, mut lines) = (Vec::new(), Vec::new(), Vec::new());
-        while cursor.at < text.len() {
-            let (start, line, before) = (cursor.at, cursor.line, ends.len());
-            cursor.row(&mut ends)?;
-            if is_blank(&text[start..cursor.at]) {
-                ends.truncate(before);
-                continue;
-            }
-            if ends.len() - before != names.len() {
-                return Err(ragged(path, line, names.len(), ends.len() - before));
-            }
-            starts.push(start);
-            lines.push(line);
-        }
-        if starts.is_empty() {
-            return Err(InputError::new(path, "the file has a header but no rows")
-                .at(Place::Row(header_line))
-                .hint("was the recording cut off before its first sample?"));
-        }
-        Ok(Self { text, names, starts, ends, lines })
+        let rows = cursor.rows(names.len())?;
+        Ok(Self { text, names, rows, header_line })
+    }
+
+    /// Cuts complete lines of the file of which `self` is an earlier block.
+    ///
+    /// # Errors
+    /// Bytes that are not UTF-8, rows of other lengths than the header, a quote that is not closed.
+    pub(super) fn next_block(&self, path: &Path, bytes: Vec<u8>) -> Result<Self, InputError> {
+        let line = self.rows.next_line;
+        let text = decode(path, bytes, line)?;
+        let rows = Cursor { path, text: &text, at: 0, line }.rows(self.names.len())?;
+        Ok(Self { text, names: self.names.clone(), rows, header_line: self.header_line })
+    }
+
+    /// What a later block needs of this one.
+    pub(super) fn without_rows(&self) -> Self {
+        let rows = Rows { starts: Vec::new(), ends: Vec::new(), lines: Vec::new(), next_line: self.rows.next_line };
+        Self { text: String::new(), names: self.names.clone(), rows, header_line: self.header_line }
+    }
+
+    /// The error of a file that ended without rows.
+    pub(super) fn no_rows(&self, path: &Path) -> InputError {
+        no_rows(path, self.header_line)
     }
 
     pub(super) fn names(&self) -> &[String] {
@@ -71,18 +92,18 @@ impl CsvText {
     }
 
     pub(super) fn rows(&self) -> usize {
-        self.starts.len()
+        self.rows.starts.len()
     }
 
     /// Line of the file on which data row `row` starts, from 1.
     pub(super) fn line(&self, row: usize) -> usize {
-        self.lines.get(row).copied().unwrap_or_default()
+        self.rows.lines.get(row).copied().unwrap_or_default()
     }
 
     /// A cell without its quotes, or without the blanks around it.
     pub(super) fn cell(&self, row: usize, column: usize) -> Cow<'_, str> {
         let width = self.names.len();
-        shown(cell(&self.text, self.starts[row], &self.ends[row * width..(row + 1) * width], column))
+        shown(cell(&self.text, self.rows.starts[row], &self.rows.ends[row * width..(row + 1) * width], column))
     }
 }
 
@@ -122,11 +143,18 @@ fn ragged(path: &Path, line: usize, expected: usize, found: usize) -> InputError
         .hint(hint)
 }
 
-fn decode(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
+fn no_rows(path: &Path, header_line: usize) -> InputError {
+    InputError::new(path, "the file has a header but no rows")
+        .at(Place::Row(header_line))
+        .hint("was the recording cut off before its first sample?")
+}
+
+/// `bytes`, which begin with line `first` of the file, as text.
+fn decode(path: &Path, bytes: Vec<u8>, first: usize) -> Result<String, InputError> {
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
-        let line = 1 + bytes[..valid].iter().filter(|b| **b == b'\n').count();
+        let line = first + bytes[..valid].iter().filter(|b| **b == b'\n').count();
         let hint = match bytes {
             [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "this is UTF-16: save it as UTF-8",
             [0x1f, 0x8b, ..] => "this is compressed by gzip: name it .csv.gz",
@@ -148,6 +176,25 @@ struct Cursor<'a> {
 }
 
 impl Cursor<'_> {
+    /// Reads all rows that are left, of `width` cells each; blank lines are none.
+    fn rows(mut self, width: usize) -> Result<Rows, InputError> {
+        let (mut starts, mut ends, mut lines) = (Vec::new(), Vec::new(), Vec::new());
+        while self.at < self.text.len() {
+            let (start, line, before) = (self.at, self.line, ends.len());
+            self.row(&mut ends)?;
+            if is_blank(&self.text[start..self.at]) {
+                ends.truncate(before);
+                continue;
+            }
+            if ends.len() - before != width {
+                return Err(ragged(self.path, line, width, ends.len() - before));
+            }
+            starts.push(start);
+            lines.push(line);
+        }
+        Ok(Rows { starts, ends, lines, next_line: self.line })
+    }
+
     /// Reads one row, up to and with its line end; adds the ends of its cells.
     fn row(&mut self, ends: &mut Vec<u32>) -> Result<(), InputError> {
         let bytes = self.text.as_bytes();

@@ -1,11 +1,15 @@
 //! How market data files are written, as far as a document must say it.
 
+use std::path::PathBuf;
+
 use chrono_tz::{TZ_VARIANTS, Tz};
 use serde::de::Error;
 use serde::{Deserialize as _, Deserializer};
 
 use super::document::{Document, HINT};
 use super::error::{InputError, hint_among};
+use super::feed_rules::{FeedClock, FeedRules};
+use super::layout::Layout;
 use super::source::open;
 use super::stamp::Stamp;
 use super::table::Renames;
@@ -22,15 +26,38 @@ pub struct FeedFormat {
     pub price_scale: f64,
     /// Columns that are named otherwise.
     pub columns: Renames,
+    /// Whose columns they are.
+    pub layout: Layout,
+    /// When rows were known.
+    pub clock: FeedClock,
+    /// What rows are held to.
+    pub rules: FeedRules,
+    /// The file of the book from which on a file of its changes counts, where the layout has one.
+    pub snapshot: Option<PathBuf>,
 }
 
 impl Default for FeedFormat {
     fn default() -> Self {
-        Self { stamp: None, time: TimeFormat::default(), price_scale: 1.0, columns: Renames::new() }
+        Self::of_layout(Layout::Trueup)
     }
 }
 
 impl FeedFormat {
+    /// The format of a layout where nothing else is declared.
+    #[must_use]
+    pub fn of_layout(layout: Layout) -> Self {
+        Self {
+            stamp: layout.stamp(),
+            time: TimeFormat::default(),
+            price_scale: layout.price_scale(),
+            columns: Renames::new(),
+            layout,
+            clock: FeedClock::default(),
+            rules: FeedRules::default(),
+            snapshot: None,
+        }
+    }
+
     /// The format that the optional keys of a section say.
     pub(super) fn of(
         stamp: Option<Stamp>,
@@ -40,7 +67,7 @@ impl FeedFormat {
         columns: Renames,
     ) -> Self {
         let time = TimeFormat { unit: unit.unwrap_or_default(), zone: zone.unwrap_or(Tz::UTC) };
-        Self { stamp, time, price_scale: price_scale.unwrap_or(1.0), columns }
+        Self { stamp, time, price_scale: price_scale.unwrap_or(1.0), columns, ..Self::default() }
     }
 
     /// Holds the section at `keys`, which may name bars, to what can be held without reading them.

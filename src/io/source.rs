@@ -67,7 +67,7 @@ fn nearest_file(path: &Path) -> Option<String> {
 /// All bytes of a file.
 pub(super) fn bytes(path: &Path, mut file: File) -> Result<Vec<u8>, InputError> {
     let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(|error| InputError::new(path, format!("cannot be read ({error})")))?;
+    file.read_to_end(&mut bytes).map_err(|error| unreadable(path, &error))?;
     Ok(bytes)
 }
 
@@ -84,7 +84,7 @@ pub fn file_hash(path: impl AsRef<Path>) -> Result<String, InputError> {
         match file.read(&mut piece) {
             Ok(0) => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
             Ok(count) => hash.update(&piece[..count]),
-            Err(error) => return Err(InputError::new(path, format!("cannot be read ({error})"))),
+            Err(error) => return Err(unreadable(path, &error)),
         }
     }
 }
@@ -92,9 +92,17 @@ pub fn file_hash(path: impl AsRef<Path>) -> Result<String, InputError> {
 /// All bytes of a file, decompressed.
 pub(super) fn unzip(path: &Path, file: File) -> Result<Vec<u8>, InputError> {
     let mut bytes = Vec::new();
-    flate2::read::MultiGzDecoder::new(file).read_to_end(&mut bytes).map_err(|error| {
-        InputError::new(path, format!("expected a whole gzip file ({error})"))
-            .hint("the file is truncated, corrupt or not compressed: copy or write it again")
-    })?;
+    flate2::read::MultiGzDecoder::new(file).read_to_end(&mut bytes).map_err(|error| no_gzip(path, &error))?;
     Ok(bytes)
+}
+
+/// The error of a file that cannot be read.
+pub(super) fn unreadable(path: &Path, error: &std::io::Error) -> InputError {
+    InputError::new(path, format!("cannot be read ({error})"))
+}
+
+/// The error of a compressed file that cannot be read.
+pub(super) fn no_gzip(path: &Path, error: &std::io::Error) -> InputError {
+    InputError::new(path, format!("expected a whole gzip file ({error})"))
+        .hint("the file is truncated, corrupt or not compressed: copy or write it again")
 }

@@ -21,6 +21,8 @@ pub struct Table {
     path: PathBuf,
     renames: Renames,
     body: Body,
+    /// Data rows of the file before these, where its rows are counted and not its lines.
+    before: usize,
 }
 
 enum Body {
@@ -55,21 +57,36 @@ impl Table {
             Ending::CsvGz => Body::Csv(CsvText::parse(path, unzip(path, open(path)?)?)?),
             Ending::Columnar(container) => Body::Columnar(ColumnarFile::read(path, open(path)?, container)?),
         };
-        let table = Self { path: path.to_path_buf(), renames: renames.clone(), body };
-        let own = table.own_names();
+        let table = Self { path: path.to_path_buf(), renames: renames.clone(), body, before: 0 };
+        table.check_columns()?;
+        Ok(table)
+    }
+
+    /// A block of the rows of a CSV file.
+    pub(super) fn of_csv(path: &Path, renames: &Renames, block: CsvText) -> Self {
+        Self { path: path.to_path_buf(), renames: renames.clone(), body: Body::Csv(block), before: 0 }
+    }
+
+    /// The rows of a columnar file that follow the first `before`.
+    pub(super) fn of_piece(path: &Path, renames: &Renames, piece: ColumnarFile, before: usize) -> Self {
+        Self { path: path.to_path_buf(), renames: renames.clone(), body: Body::Columnar(piece), before }
+    }
+
+    /// Holds the columns to have names of their own, and the renames to be of columns that are there.
+    pub(super) fn check_columns(&self) -> Result<(), InputError> {
+        let own = self.own_names();
         let mut seen = BTreeSet::new();
         if let Some(name) = own.iter().find(|name| !seen.insert(name.as_str())) {
-            return Err(InputError::new(path, format!("two columns are named `{name}`")).hint("rename or drop one of them"));
+            let error = InputError::new(&self.path, format!("two columns are named `{name}`"));
+            return Err(error.hint("rename or drop one of them"));
         }
-        for (name, file_name) in renames {
-            if !own.contains(file_name) {
-                return Err(table.no_column(file_name).hint(format!(
-                    "`columns` says that `{name}` is here called `{file_name}`; {}",
-                    hint_among(file_name, own).unwrap_or_default()
-                )));
-            }
+        match self.renames.iter().find(|(_, file_name)| !own.contains(file_name)) {
+            None => Ok(()),
+            Some((name, file_name)) => Err(self.no_column(file_name).hint(format!(
+                "`columns` says that `{name}` is here called `{file_name}`; {}",
+                hint_among(file_name, own).unwrap_or_default()
+            ))),
         }
-        Ok(table)
     }
 
     /// The file.
@@ -244,7 +261,7 @@ impl Table {
     pub fn place(&self, row: usize) -> Place {
         match &self.body {
             Body::Csv(csv) => Place::Row(csv.line(row)),
-            Body::Columnar(_) => Place::Row(row + 1),
+            Body::Columnar(_) => Place::Row(self.before + row + 1),
         }
     }
 
@@ -322,11 +339,15 @@ impl Table {
         let hole = cells.iter().position(Option::is_none);
         match hole {
             None => Ok(cells.into_iter().flatten().collect()),
-            Some(row) => Err(self
-                .error(name, row, format!("expected {what}"))
-                .found(self.hole(name, row))
-                .hint("this column must be complete: fill the cell or drop the row")),
+            Some(row) => Err(self.missing(name, row, what)),
         }
+    }
+
+    /// The error of a cell that has no value, in a column that must be complete: `what` was expected there.
+    #[must_use]
+    pub fn missing(&self, name: &str, row: usize, what: &str) -> InputError {
+        let hint = "this column must be complete: fill the cell or drop the row";
+        self.error(name, row, format!("expected {what}")).found(self.hole(name, row)).hint(hint)
     }
 }
 

@@ -4,8 +4,8 @@ use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
 use super::{
-    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, Matching, MoneyError, QueueModel, Reference,
-    Session, Strategy,
+    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, Matching, MoneyError, QueueModel,
+    Reference, Session, Strategy,
 };
 
 /// A backtest, as it was set up.

@@ -196,7 +196,8 @@ impl Iterator for Feed<'_> {
         let known_at = track.rows.known_at(row).max(time);
         let event = Event { time, instrument: track.instrument, kind: track.kind };
         track.next = end;
-        self.times[winner as usize] = track.rows.time(end);
+        // Rows are in the order in which they were known; the exchange's clock may step back a little.
+        self.times[winner as usize] = track.rows.time(end).max(time);
         self.replay(winner);
         Some(Arrival { event, row, end, known_at })
     }

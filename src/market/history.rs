@@ -4,17 +4,22 @@ use std::sync::Arc;
 
 use crate::sim2real::Timestamp;
 
-use super::{Bar, DepthChange, OrderEvent, Price, Print, Quotes};
+use super::row_check::{check_bar, check_depth, check_order, check_print, check_quote};
+use super::{Bar, DataNotes, DepthChange, OrderEvent, Print, Quotes};
 
-/// Bars and quotes of one instrument, in the order in which they could be known. It was made by its own checks, so that
-/// what reads it need not check again. A clone shares them: many runs on the same data hold them once.
+/// Bars, quotes, trades and changes of the book of one instrument, each in the order in which they could be known. It was
+/// made by its own checks, so that what reads it need not check again. A clone shares them: many runs on the same data hold them once.
+///
+/// The `time` of a quote and of a trade is here the time at which it could be known: a backtest that shows them by it shows
+/// nothing early. Changes of the book and order events have both times.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct History {
     bars: Arc<Vec<Bar>>,
     quotes: Arc<Quotes>,
     prints: Arc<Vec<Print>>,
     depth: Arc<Vec<DepthChange>>,
-    orders: Arc<Vec<OrderEvent>>,
+    order_events: Arc<Vec<OrderEvent>>,
+    notes: Vec<DataNotes>,
 }
 
 /// A history that cannot be.
@@ -23,7 +28,7 @@ pub enum HistoryError {
     /// Time goes back, or stands still where it must not.
     #[error("{what} {row}: its time {found} does not follow {before}\nhint: sort by time and remove duplicates")]
     Time {
-        /// "bar" or "quote".
+        /// "bar", "quote", "trade" and so on.
         what: &'static str,
         /// Row, from 0.
         row: usize,
@@ -68,6 +73,32 @@ pub enum HistoryError {
         /// The remedy.
         hint: &'static str,
     },
+    /// A trade, a change of the book or an order event that cannot be.
+    #[error("{what} {row}: {column} is {value}\nhint: {hint}")]
+    Event {
+        /// What it is.
+        what: &'static str,
+        /// Row, from 0.
+        row: usize,
+        /// The column at fault.
+        column: &'static str,
+        /// What was found.
+        value: f64,
+        /// The remedy.
+        hint: &'static str,
+    },
+    /// What was known before it happened.
+    #[error("{what} {row}: it was known at {known_at}, before it happened at {time}\nhint: add an offset to the clock")]
+    Known {
+        /// What it is.
+        what: &'static str,
+        /// Row, from 0.
+        row: usize,
+        /// When it happened.
+        time: Timestamp,
+        /// When it was known.
+        known_at: Timestamp,
+    },
 }
 
 impl History {
@@ -81,30 +112,47 @@ impl History {
         Ok(Self { bars: Arc::new(bars), quotes: Arc::new(quotes), ..Self::default() })
     }
 
+    /// The same with these trades.
+    ///
+    /// # Errors
+    /// If times go back, or a price or size is not above 0.
+    pub fn with_prints(self, prints: Vec<Print>) -> Result<Self, HistoryError> {
+        check_order_of_times("trade", prints.iter().map(|print| print.time))?;
+        prints.iter().enumerate().try_for_each(|(row, print)| check_print(row, print))?;
+        Ok(Self { prints: Arc::new(prints), ..self })
+    }
+
+    /// The same with these changes of the book, price by price.
+    ///
+    /// # Errors
+    /// If the times at which they were known go back, one was known before it happened, or a price or size cannot be.
+    pub fn with_depth(self, depth: Vec<DepthChange>) -> Result<Self, HistoryError> {
+        check_order_of_times("change of the book", depth.iter().map(|change| change.known_at))?;
+        depth.iter().enumerate().try_for_each(|(row, change)| check_depth(row, change))?;
+        Ok(Self { depth: Arc::new(depth), ..self })
+    }
+
+    /// The same with these events of resting orders.
+    ///
+    /// # Errors
+    /// If the times at which they were known go back, one was known before it happened, or a price or size cannot be.
+    pub fn with_order_events(self, order_events: Vec<OrderEvent>) -> Result<Self, HistoryError> {
+        check_order_of_times("order event", order_events.iter().map(|event| event.known_at))?;
+        order_events.iter().enumerate().try_for_each(|(row, event)| check_order(row, event))?;
+        Ok(Self { order_events: Arc::new(order_events), ..self })
+    }
+
+    /// The same with what is to be said of the data it was read from.
+    #[must_use]
+    pub fn with_notes(mut self, notes: DataNotes) -> Self {
+        self.notes.push(notes);
+        self
+    }
+
     /// Its bars, oldest first.
     #[must_use]
     pub fn bars(&self) -> &[Bar] {
         &self.bars
-    }
-
-    /// Whether nothing is known.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.bars.is_empty()
-            && self.quotes.is_empty()
-            && self.prints.is_empty()
-            && self.depth.is_empty()
-            && self.orders.is_empty()
-    }
-
-    /// Whether bars are all that is known.
-    #[must_use]
-    pub fn shows_bars_alone(&self) -> bool {
-        !self.bars.is_empty()
-            && self.quotes.is_empty()
-            && self.prints.is_empty()
-            && self.depth.is_empty()
-            && self.orders.is_empty()
     }
 
     /// Its bars alone, oldest first.
@@ -125,53 +173,76 @@ impl History {
         &self.prints
     }
 
-    /// The changes of its book by price, oldest first.
+    /// Its changes of the book, in the order in which they were known.
     #[must_use]
     pub fn depth(&self) -> &[DepthChange] {
         &self.depth
     }
 
-    /// What happened to the orders in its book, oldest first.
+    /// Its events of resting orders, in the order in which they were known.
     #[must_use]
     pub fn order_events(&self) -> &[OrderEvent] {
-        &self.orders
+        &self.order_events
     }
 
-    /// The same with trades.
+    /// What is to be said of the files it was read from: one a file.
     #[must_use]
-    pub fn with_prints(self, prints: Vec<Print>) -> Self {
-        Self { prints: Arc::new(prints), ..self }
+    pub fn notes(&self) -> &[DataNotes] {
+        &self.notes
     }
 
-    /// The same with changes of the book by price.
+    /// Whether there is nothing in it.
     #[must_use]
-    pub fn with_depth(self, depth: Vec<DepthChange>) -> Self {
-        Self { depth: Arc::new(depth), ..self }
+    pub fn is_empty(&self) -> bool {
+        let empty = [self.bars.is_empty(), self.quotes.is_empty(), self.prints.is_empty()];
+        empty.into_iter().all(|empty| empty) && self.depth.is_empty() && self.order_events.is_empty()
     }
 
-    /// The same with what happened to the orders in the book.
+    /// Whether bars are all there is in it.
     #[must_use]
-    pub fn with_order_events(self, orders: Vec<OrderEvent>) -> Self {
-        Self { orders: Arc::new(orders), ..self }
+    pub fn shows_bars_alone(&self) -> bool {
+        let finer =
+            self.quotes.is_empty() && self.prints.is_empty() && self.depth.is_empty() && self.order_events.is_empty();
+        finer && !self.bars.is_empty()
     }
 
-    /// These bars with the quotes of `other`: each was checked when it was made.
+    /// Number of its rows of all kinds.
     #[must_use]
-    pub fn with_quotes_of(self, other: Self) -> Self {
-        Self { quotes: other.quotes, ..self }
+    pub fn rows(&self) -> usize {
+        self.bars.len() + self.quotes.len() + self.prints.len() + self.depth.len() + self.order_events.len()
+    }
+
+    /// The same with the kinds of data that it has not and `other` has: each was checked when it was made.
+    #[must_use]
+    pub fn joined_with(self, other: Self) -> Self {
+        let notes = self.notes.into_iter().chain(other.notes).collect();
+        Self {
+            bars: if self.bars.is_empty() { other.bars } else { self.bars },
+            quotes: if self.quotes.is_empty() { other.quotes } else { self.quotes },
+            prints: if self.prints.is_empty() { other.prints } else { self.prints },
+            depth: if self.depth.is_empty() { other.depth } else { self.depth },
+            order_events: if self.order_events.is_empty() { other.order_events } else { self.order_events },
+            notes,
+        }
     }
 
     /// The same history without what was known before `start` or after `end`.
     #[must_use]
     pub fn within(&self, start: Timestamp, end: Timestamp) -> Self {
-        let bars = self.bars.iter().filter(|bar| bar.known_at >= start && bar.known_at <= end).copied().collect();
         let all = self.quotes.all();
         let mut quotes = Quotes::with_depth(self.quotes.depth());
         let from = all.times().partition_point(|time| *time < start);
         for quote in (from..all.len()).map_while(|k| all.get(k)).take_while(|quote| quote.time <= end) {
             quotes.push(quote.time, quote.bids, quote.asks);
         }
-        Self { bars: Arc::new(bars), quotes: Arc::new(quotes), ..Self::default() }
+        Self {
+            bars: Arc::new(cut(&self.bars, |bar| bar.known_at, start, end)),
+            quotes: Arc::new(quotes),
+            prints: Arc::new(cut(&self.prints, |print| print.time, start, end)),
+            depth: Arc::new(cut(&self.depth, |change| change.known_at, start, end)),
+            order_events: Arc::new(cut(&self.order_events, |event| event.known_at, start, end)),
+            notes: self.notes.clone(),
+        }
     }
 }
 
@@ -183,25 +254,7 @@ fn check_bars(bars: &[Bar]) -> Result<(), HistoryError> {
         {
             return Err(HistoryError::Time { what: "bar", row, found: bar.open_at, before: before.known_at });
         }
-        if bar.known_at <= bar.open_at {
-            return Err(HistoryError::Span { row, open_at: bar.open_at, known_at: bar.known_at });
-        }
-        let fault = |column, price: Price| Err(HistoryError::Bar { row, column, value: price.to_f64() });
-        if bar.low.0 <= 0 {
-            return fault("low", bar.low);
-        }
-        if bar.high < bar.low {
-            return fault("high", bar.high);
-        }
-        if bar.open < bar.low || bar.open > bar.high {
-            return fault("open", bar.open);
-        }
-        if bar.close < bar.low || bar.close > bar.high {
-            return fault("close", bar.close);
-        }
-        if !bar.volume.is_finite() || bar.volume < 0.0 {
-            return Err(HistoryError::Bar { row, column: "volume", value: bar.volume });
-        }
+        check_bar(row, bar)?;
         before = Some(bar);
     }
     Ok(())
@@ -209,45 +262,36 @@ fn check_bars(bars: &[Bar]) -> Result<(), HistoryError> {
 
 fn check_quotes(quotes: &Quotes) -> Result<(), HistoryError> {
     let all = quotes.all();
-    for (row, pair) in all.times().windows(2).enumerate() {
-        if pair[1] < pair[0] {
-            return Err(HistoryError::Time { what: "quote", row: row + 1, found: pair[1], before: pair[0] });
-        }
-    }
+    check_order_of_times("quote", all.times().iter().copied())?;
     for (row, quote) in (0..all.len()).map_while(|k| all.get(k)).enumerate() {
-        for (side, levels, outward) in [("bid", quote.bids, -1.0), ("ask", quote.asks, 1.0)] {
-            let mut best = f64::NEG_INFINITY;
-            for (k, level) in levels.iter().enumerate() {
-                let column = if k == 0 { side.to_owned() } else { format!("{side}{}", k + 1) };
-                if !level.price.is_finite() || level.price <= 0.0 || Price::nearest(level.price).is_err() {
-                    let hint = "a price must be above 0 and at most 9.2e9; leave an empty side out";
-                    return Err(HistoryError::Quote { row, column, value: level.price, hint });
-                }
-                if level.size.is_nan() || level.size <= 0.0 {
-                    let hint = "a displayed size must be above 0; leave an empty side out";
-                    return Err(HistoryError::Quote { row, column: format!("{column}_size"), value: level.size, hint });
-                }
-                if outward * level.price <= best {
-                    let hint = "deeper levels must have worse prices";
-                    return Err(HistoryError::Quote { row, column, value: level.price, hint });
-                }
-                best = outward * level.price;
-            }
-        }
-        if let (Some(bid), Some(ask)) = (quote.bid(), quote.ask())
-            && bid > ask
-        {
-            let hint = "the bid is above the ask: remove crossed quotes, or check that the columns are not swapped";
-            return Err(HistoryError::Quote { row, column: "ask".into(), value: ask, hint });
-        }
+        check_quote(row, quote.bids, quote.asks)?;
     }
     Ok(())
+}
+
+/// Holds times not to go back.
+fn check_order_of_times(what: &'static str, times: impl Iterator<Item = Timestamp>) -> Result<(), HistoryError> {
+    let mut before = Timestamp::MIN;
+    for (row, found) in times.enumerate() {
+        if found < before {
+            return Err(HistoryError::Time { what, row, found, before });
+        }
+        before = found;
+    }
+    Ok(())
+}
+
+/// Those of `rows`, which are in order of `time`, from `start` to `end`.
+fn cut<T: Copy>(rows: &[T], time: impl Fn(&T) -> Timestamp, start: Timestamp, end: Timestamp) -> Vec<T> {
+    let from = rows.partition_point(|row| time(row) < start);
+    let to = rows.partition_point(|row| time(row) <= end);
+    rows.get(from..to).unwrap_or_default().to_vec()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::market::Level;
+    use crate::market::{DepthAction, Level, OrderAction, Price, Side};
 
     fn bar(open_at: i64, prices: [i64; 4], volume: f64) -> Bar {
         let [open, high, low, close] = prices.map(|p| Price(p * 1_000_000_000));
@@ -299,5 +343,49 @@ mod tests {
         let bars = [0, 10, 20, 30].map(|t| bar(t, [10, 12, 9, 11], 1.0));
         let history = of_bars(&bars).unwrap();
         assert_eq!(history.within(Timestamp(20), Timestamp(39)).bars(), &bars[1..3]);
+    }
+
+    #[test]
+    fn trades_and_books_are_held_to_what_they_can_be_and_cut_like_the_rest() {
+        let print = |time: i64, price: f64, size: f64| Print { time: Timestamp(time), price, size, aggressor: None };
+        let prints = |rows: &[Print]| History::default().with_prints(rows.to_vec()).map_err(|error| error.to_string());
+        assert!(prints(&[print(1, 9.0, 1.0), print(0, 9.0, 1.0)]).unwrap_err().starts_with("trade 1: its time"));
+        for (price, size, fault) in
+            [(0.0, 1.0, "price"), (f64::NAN, 1.0, "price"), (9.0, -1.0, "size"), (9.0, f64::NAN, "size")]
+        {
+            assert!(prints(&[print(0, price, size)]).unwrap_err().starts_with(&format!("trade 0: {fault} is")));
+        }
+        let change = |time: i64, known_at: i64, price: i64, size: f64| DepthChange {
+            time: Timestamp(time),
+            known_at: Timestamp(known_at),
+            side: Side::Buy,
+            action: DepthAction::Set,
+            price: Price(price),
+            size,
+        };
+        let depth = |rows: &[DepthChange]| History::default().with_depth(rows.to_vec()).map_err(|error| error.to_string());
+        assert!(depth(&[change(5, 6, 1, 0.0), change(4, 6, 1, 1.0)]).is_ok(), "events may overtake each other on their way");
+        assert!(depth(&[change(5, 6, 1, 0.0), change(4, 5, 1, 1.0)]).unwrap_err().contains("does not follow"));
+        assert!(depth(&[change(5, 4, 1, 0.0)]).unwrap_err().contains("before it happened"));
+        assert!(depth(&[change(5, 6, 0, 0.0)]).unwrap_err().contains("price is 0"));
+        assert!(depth(&[change(5, 6, 1, -1.0)]).unwrap_err().contains("size is -1"));
+        assert!(depth(&[DepthChange { action: DepthAction::Clear, ..change(5, 6, 0, f64::NAN) }]).is_ok());
+        let event = |action, size| OrderEvent {
+            time: Timestamp(1),
+            known_at: Timestamp(2),
+            id: 7,
+            action,
+            side: Side::Sell,
+            price: Price(1),
+            size,
+        };
+        let orders = |row| History::default().with_order_events(vec![row]);
+        assert!(orders(event(OrderAction::Delete, 0.0)).is_ok());
+        assert!(orders(event(OrderAction::Add, 0.0)).is_err() && orders(event(OrderAction::Change, f64::NAN)).is_err());
+        let all = History::default().with_prints((0..4).map(|t| print(t, 1.0, 1.0)).collect()).unwrap();
+        let all = all.with_depth((0..4).map(|t| change(0, t, 1, 1.0)).collect()).unwrap();
+        let within = all.within(Timestamp(1), Timestamp(2));
+        assert_eq!((within.prints(), within.depth()), (&all.prints()[1..3], &all.depth()[1..3]));
+        assert!(!within.is_empty() && all.within(Timestamp(9), Timestamp(9)).is_empty());
     }
 }

@@ -146,6 +146,8 @@ pub(super) fn in_file(table: &Table, error: &HistoryError, scale: f64) -> InputE
             (column.as_str(), *row, value.to_string())
         }
         HistoryError::Quote { row, column, value, .. } => (column.as_str(), *row, (value / scale).to_string()),
+        HistoryError::Event { row, column, value, .. } => (*column, *row, value.to_string()),
+        HistoryError::Known { row, known_at, .. } => ("known_at", *row, known_at.to_string()),
     };
     let (message, hint) = match error {
         HistoryError::Time { .. } => ("expected a time after the one before", "sort the rows by time"),
@@ -153,6 +155,8 @@ pub(super) fn in_file(table: &Table, error: &HistoryError, scale: f64) -> InputE
         HistoryError::Bar { column: "volume", .. } => ("expected a volume of 0 or more", "drop the row or correct it"),
         HistoryError::Bar { .. } => ("expected low <= open, close <= high", "drop the row or correct it"),
         HistoryError::Quote { hint, .. } => ("no such quote can be", *hint),
+        HistoryError::Event { hint, .. } => ("no such row can be", *hint),
+        HistoryError::Known { .. } => ("expected a time no earlier than the row's own", "declare a `clock_offset`"),
     };
     table.error(column, row, message).found(found).hint(hint)
 }

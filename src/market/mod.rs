@@ -10,6 +10,7 @@ mod calendar;
 mod check;
 mod covariate;
 mod daily;
+mod data_notes;
 mod depth;
 mod depth_book;
 mod desk;
@@ -36,6 +37,7 @@ mod past;
 mod price_assumption;
 mod quote;
 mod reason;
+mod row_check;
 #[cfg(feature = "io")]
 mod run;
 #[cfg(feature = "io")]
@@ -74,6 +76,7 @@ pub use calendar::{
 };
 pub use check::{check_strategy, check_strategy_on};
 pub use daily::Daily;
+pub use data_notes::{DataNotes, Finding, Treatment};
 pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
 pub use depth_book::DepthBook;
 pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};

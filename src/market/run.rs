@@ -34,7 +34,7 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     let mut read = Vec::new();
     for (index, entry) in run.data.iter().enumerate() {
         let history = history(run, index, entry)?;
-        let rows = history.bars().len() + history.quotes().len();
+        let rows = history.rows();
         inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: Some(rows) });
         read.push(Some(history));
     }
@@ -133,13 +133,10 @@ fn joined(run: &RunFile, index: usize, symbol: &str, read: &mut [Option<History>
         let at = run.data.iter().position(|data| data.symbol == symbol && data.kind == kind)?;
         read[at].take()
     };
-    let whole = match (take(FeedKind::Bars), take(FeedKind::Quotes)) {
-        (Some(bars), Some(quotes)) => bars.with_quotes_of(quotes),
-        (Some(one), None) | (None, Some(one)) => one,
-        (None, None) => {
-            let error = run.error(&["instrument", &index.to_string()], format!("there are no data of `{symbol}`"));
-            return Err(error.hint("add [[data]] with its symbol and bars or quotes, or drop the instrument"));
-        }
+    let kinds = [FeedKind::Bars, FeedKind::Quotes, FeedKind::Trades, FeedKind::Book];
+    let Some(whole) = kinds.into_iter().filter_map(&mut take).reduce(History::joined_with) else {
+        let error = run.error(&["instrument", &index.to_string()], format!("there are no data of `{symbol}`"));
+        return Err(error.hint("add [[data]] with its symbol and bars, quotes, trades or book, or drop the instrument"));
     };
     let (start, end) = (run.run.start, run.run.end);
     if start.is_none() && end.is_none() {
@@ -148,7 +145,7 @@ fn joined(run: &RunFile, index: usize, symbol: &str, read: &mut [Option<History>
     // A run's end is the first instant that no longer counts.
     let last = end.map_or(Timestamp::MAX, |end| Timestamp(end.0.saturating_sub(1)));
     let within = whole.within(start.unwrap_or(Timestamp::MIN), last);
-    if within.bars().is_empty() && within.quotes().is_empty() {
+    if within.is_empty() {
         let key = if start.is_some() { "start" } else { "end" };
         let error = run.error(&["run", key], format!("there are no data of `{symbol}` between `start` and `end`"));
         return Err(error.hint("leave them out to run on all data; times without a zone in files are UTC unless declared"));

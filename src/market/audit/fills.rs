@@ -56,7 +56,9 @@ pub struct FillFault {
 /// The fills of `record` that cannot be.
 pub(super) fn impossible(backtest: &Backtest, record: &Record) -> Vec<FillFault> {
     let one = |fill: &Fill| {
-        let history = backtest.histories().get(fill.instrument)?;
+        // What a whole book showed is not kept: of its fills the decision's time alone is held against them.
+        let history =
+            backtest.histories().get(fill.instrument).filter(|h| h.shows_bars_alone() || !h.quotes().is_empty())?;
         let decided_at = decided_at(record, fill)?;
         let range = range(history, decided_at, fill.filled_at);
         let fault = match range {
@@ -75,15 +77,14 @@ pub(super) fn impossible(backtest: &Backtest, record: &Record) -> Vec<FillFault>
 pub(super) fn at_seen_prices(backtest: &Backtest, cut_off: &Record, now: Timestamp) -> Vec<FillFault> {
     let one = |fill: &Fill| {
         let history = backtest.histories().get(fill.instrument)?;
-        let decided_at = decided_at(cut_off, fill).filter(|at| *at == now && history.quotes().is_empty())?;
+        let decided_at = decided_at(cut_off, fill).filter(|at| *at == now && history.shows_bars_alone())?;
         Some(fault_of(fill, decided_at, Impossible::SeenPrice, None, backtest.instruments()))
     };
     cut_off.blotter.fills.iter().filter_map(one).collect()
 }
 
 fn decided_at(record: &Record, fill: &Fill) -> Option<Timestamp> {
-    let order = record.blotter.orders.get(usize::try_from(fill.order_id).ok()?.checked_sub(1)?)?;
-    Some(order.decided_at)
+    record.blotter.order(fill.order_id).map(|order| order.decided_at)
 }
 
 fn fault_of(

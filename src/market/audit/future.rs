@@ -57,7 +57,7 @@ fn cut_off(history: &History, now: Timestamp) -> History {
     // What of the bar under way had been seen.
     let begun = Bar { high: bar.open, low: bar.open, close: bar.open, ..*bar };
     let bars = past.bars().iter().copied().chain([begun]).collect();
-    History::new(bars, Quotes::default()).map(|bars| bars.with_quotes_of(past)).unwrap_or_default()
+    History::new(bars, Quotes::default()).map(|bars| bars.joined_with(past)).unwrap_or_default()
 }
 
 fn changed(history: &History, now: Timestamp, seed: Seed, number: usize) -> History {
@@ -82,8 +82,24 @@ fn changed(history: &History, now: Timestamp, seed: Seed, number: usize) -> Hist
         };
         quotes.push(quote.time, &moved(quote.bids), &moved(quote.asks));
     }
+    let mut prints = history.prints().to_vec();
+    for print in prints.iter_mut().filter(|print| print.time > now) {
+        (print.price, print.size) = (print.price * factor(), print.size * factor());
+    }
+    let mut depth = history.depth().to_vec();
+    for change in depth.iter_mut().filter(|change| change.known_at > now) {
+        (change.price, change.size) = (scaled(change.price, factor()), change.size * factor());
+    }
+    let mut orders = history.order_events().to_vec();
+    for event in orders.iter_mut().filter(|event| event.known_at > now) {
+        (event.price, event.size) = (scaled(event.price, factor()), event.size * factor());
+    }
     // What it was made of was a history, and prices stay above 0 and in order.
-    History::new(bars, quotes).unwrap_or_default()
+    History::new(bars, quotes)
+        .and_then(|history| history.with_prints(prints))
+        .and_then(|history| history.with_depth(depth))
+        .and_then(|history| history.with_order_events(orders))
+        .unwrap_or_default()
 }
 
 fn scaled(price: Price, factor: f64) -> Price {

@@ -5,8 +5,8 @@ use std::sync::Mutex;
 use serde::Serialize;
 
 use crate::market::{
-    Backtest, BacktestError, EquityPoint, Fill, Instrument, OrderKind, Orders, Price, Record, Rejection, Request, Side, Strategy,
-    View,
+    Backtest, BacktestError, EquityPoint, Fill, Instrument, OrderKind, Orders, Price, Record, Rejection, Request, Side,
+    Strategy, View,
 };
 use crate::sim2real::Timestamp;
 

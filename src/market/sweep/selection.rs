@@ -3,6 +3,7 @@
 use crate::io::{SweepGoal, SweepSection};
 
 use super::Trial;
+use crate::market::metric;
 
 /// The runs that have the section's metric, the best first; of equals the one that was tried first.
 #[must_use]
@@ -28,13 +29,18 @@ pub fn best<'t>(section: &SweepSection, trials: &'t [Trial]) -> Option<(&'t Tria
 ///
 /// Source: Bailey and Lopez de Prado, "The deflated Sharpe ratio: correcting for selection bias, backtest overfitting and
 /// non-normality", Journal of Portfolio Management 40 (2014).
-//
-// THE PLACE TO CALL `metric::deflated_sharpe(sharpe, returns, skewness, kurtosis, trials, variance)`: it takes the ratio per
-// day of `best` with its number of daily returns, skewness and kurtosis, the number of `trials` that are done, and the
-// variance of their ratios per day. Until runs tell these, it is null in sweep.json and said to be missing.
+///
+/// Ratios and moments are those of daily returns; runs that failed count for nothing.
 #[must_use]
-pub(super) fn deflated_sharpe(_best: &Trial, _trials: &[Trial]) -> Option<f64> {
-    None
+pub(super) fn deflated_sharpe(best: &Trial, trials: &[Trial]) -> Option<f64> {
+    let of = |trial: &Trial, figure: &str| trial.outcome.figure(figure);
+    let sharpes: Vec<f64> = trials.iter().filter_map(|trial| of(trial, "daily_sharpe")).collect();
+    let count = sharpes.len() as f64;
+    let mean = sharpes.iter().sum::<f64>() / count;
+    let variance = sharpes.iter().map(|s| (s - mean) * (s - mean)).sum::<f64>() / (count - 1.0).max(1.0);
+    let (skewness, kurtosis) = (of(best, "skewness")?, of(best, "kurtosis")?);
+    let days = of(best, "daily_returns")? as usize;
+    metric::deflated_sharpe(of(best, "daily_sharpe")?, days, skewness, kurtosis, count, variance)
 }
 
 #[cfg(test)]
