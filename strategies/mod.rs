@@ -2,7 +2,7 @@
 
 mod buy_and_hold;
 mod instant;
-pub mod market_making;
+mod market_making;
 mod mean_reversion;
 mod momentum;
 mod pairs;
@@ -17,6 +17,7 @@ mod vwap;
 
 pub use buy_and_hold::BuyAndHold;
 pub use instant::Instant;
+pub use market_making::{AvellanedaStoikov, MarketMaking, Quoting, TwoSided};
 pub use mean_reversion::MeanReversion;
 pub use momentum::Momentum;
 pub use pairs::Pairs;
@@ -52,6 +53,7 @@ pub struct Kind {
 /// The strategies a run can name.
 pub static STRATEGIES: &[Kind] = &[
     buy_and_hold::KIND,
+    market_making::KIND,
     mean_reversion::KIND,
     momentum::KIND,
     pairs::KIND,

@@ -123,6 +123,26 @@ impl<'a> View<'a> {
         Price::nearest(best?).ok()
     }
 
+    /// The price on a tick nearest to `price` [currency] that an order of `side` may rest at: a bid is moved down, an ask up; none
+    /// where there is no such price.
+    #[must_use]
+    pub fn restable(&self, instrument: usize, side: Side, price: f64) -> Option<Price> {
+        let price = Price::nearest(price).ok().filter(|price| price.0 > 0)?;
+        Some(self.increments.get(instrument)?.against(side.opposite(), price)).filter(|price| price.0 > 0)
+    }
+
+    /// One tick of an instrument; 0 where there is no such instrument.
+    #[must_use]
+    pub fn tick(&self, instrument: usize) -> Price {
+        self.increments.get(instrument).map_or(Price(0), |steps| steps.tick())
+    }
+
+    /// The largest whole number of lots within `quantity`, towards 0.
+    #[must_use]
+    pub fn whole_lots(&self, instrument: usize, quantity: Quantity) -> Quantity {
+        self.increments.get(instrument).map_or(Quantity::ZERO, |steps| steps.whole_lots(quantity))
+    }
+
     /// Our orders of an instrument that work, as far as is known, the oldest first.
     #[must_use]
     pub fn orders(&self, instrument: usize) -> &'a [OpenOrder] {
