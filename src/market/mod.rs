@@ -38,6 +38,7 @@ mod run_needs;
 mod run_page;
 mod session;
 mod strategy;
+mod stream;
 mod tape;
 #[cfg(feature = "io")]
 mod tape_file;
@@ -74,6 +75,9 @@ pub use run::{PreparedRun, explained, prepare_run};
 pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
 pub use session::Session;
 pub use strategy::{Event, EventKind, Orders, Request, Strategy, View};
+#[cfg(feature = "io")]
+pub use stream::FileStream;
+pub use stream::{Dated, Known, Stored, Stream, StreamError};
 pub use tape::{Print, Seen, Tape};
 #[cfg(feature = "io")]
 pub use tape_file::{TapeFiles, read_tape};
