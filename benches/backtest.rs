@@ -6,8 +6,8 @@
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use trueup::market::{
-    Backtest, Bar, Cash, DepthAction, DepthBook, DepthChange, Execution, Feed, History, Increments, Instrument, Latencies, Latency,
-    MECHANISMS, OrderId, Orders, Price, Quantity, Quotes, Settings, Side, Strategy, Ticket, View,
+    Backtest, Bar, Cash, DepthAction, DepthBook, DepthChange, Execution, Feed, History, Increments, Instrument, Latencies,
+    Latency, MECHANISMS, OrderId, Orders, Price, Quantity, Quotes, Settings, Side, Strategy, Ticket, View,
 };
 use trueup::sim2real::{Assembly, Timestamp};
 use trueup::strategies;
@@ -190,7 +190,8 @@ fn bench_merge(c: &mut Criterion) {
     let Some(histories) = eight() else { return };
     let mut group = c.benchmark_group("1,000,000 events of eight feeds");
     group.throughput(Throughput::Elements(BARS as u64)).sample_size(20);
-    group.bench_function("merged", |b| b.iter(|| Feed::new(black_box(&histories)).fold(0, |sum, arrival| sum + arrival.row)));
+    group
+        .bench_function("merged", |b| b.iter(|| Feed::new(black_box(&histories)).fold(0, |sum, arrival| sum + arrival.row)));
     group.finish();
 }
 

@@ -4,9 +4,7 @@ mod avellaneda_stoikov;
 
 use serde::Deserialize;
 
-use crate::market::{
-    Condition, Event, EventKind, OrderId, Orders, Price, Quantity, Side, Strategy, Ticket, View,
-};
+use crate::market::{Condition, Event, EventKind, OrderId, Orders, Price, Quantity, Side, Strategy, Ticket, View};
 use crate::sim2real::Timestamp;
 
 use super::{Kind, StrategyError, read};

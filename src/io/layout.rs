@@ -57,6 +57,12 @@ impl Layout {
         }
     }
 
+    /// Whether its books are told order by order, and not price by price.
+    #[must_use]
+    pub fn tells_orders(self) -> bool {
+        matches!(self, Self::TrueupOrders | Self::DatabentoMbo | Self::BitstampL3)
+    }
+
     /// The kinds of data a file of it can hold.
     #[must_use]
     pub fn kinds(self) -> &'static [FeedKind] {

@@ -9,7 +9,7 @@ use super::{Bar, DepthChange, Event, EventKind, History, OrderEvent, Print, Quot
 enum Rows<'d> {
     Bars(&'d [Bar]),
     Quotes(&'d Quotes),
-    Prints(&'d [Print]),
+    Prints(&'d [Print], &'d History),
     Depth(&'d [DepthChange]),
     Orders(&'d [OrderEvent]),
 }
@@ -19,7 +19,7 @@ impl Rows<'_> {
         match self {
             Self::Bars(rows) => rows.len(),
             Self::Quotes(rows) => rows.len(),
-            Self::Prints(rows) => rows.len(),
+            Self::Prints(rows, _) => rows.len(),
             Self::Depth(rows) => rows.len(),
             Self::Orders(rows) => rows.len(),
         }
@@ -31,7 +31,7 @@ impl Rows<'_> {
         let time = match self {
             Self::Bars(rows) => rows.get(row).map(|bar| bar.known_at),
             Self::Quotes(rows) => rows.times().get(row).copied(),
-            Self::Prints(rows) => rows.get(row).map(|print| print.time),
+            Self::Prints(rows, _) => rows.get(row).map(|print| print.time),
             Self::Depth(rows) => rows.get(row).map(|change| change.time),
             Self::Orders(rows) => rows.get(row).map(|event| event.time),
         };
@@ -41,6 +41,7 @@ impl Rows<'_> {
     /// When the row can be known.
     fn known_at(&self, row: usize) -> Timestamp {
         match self {
+            Self::Prints(_, history) => history.print_known_at(row).unwrap_or(Timestamp::MAX),
             Self::Depth(rows) => rows.get(row).map_or(Timestamp::MAX, |change| change.known_at),
             Self::Orders(rows) => rows.get(row).map_or(Timestamp::MAX, |event| event.known_at),
             _ => self.time(row),
@@ -101,7 +102,7 @@ impl<'d> Feed<'d> {
         for (instrument, history) in histories.iter().enumerate() {
             for (kind, rows) in [
                 (EventKind::Bar, Rows::Bars(history.bars())),
-                (EventKind::Trade, Rows::Prints(history.prints())),
+                (EventKind::Trade, Rows::Prints(history.prints(), history)),
                 (EventKind::Depth, Rows::Depth(history.depth())),
                 (EventKind::Depth, Rows::Orders(history.order_events())),
                 (EventKind::Quote, Rows::Quotes(history.quotes())),

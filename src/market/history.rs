@@ -17,6 +17,8 @@ pub struct History {
     bars: Arc<Vec<Bar>>,
     quotes: Arc<Quotes>,
     prints: Arc<Vec<Print>>,
+    /// When each of them could be known; empty where that is when it happened.
+    prints_known: Arc<Vec<Timestamp>>,
     depth: Arc<Vec<DepthChange>>,
     order_events: Arc<Vec<OrderEvent>>,
     notes: Vec<DataNotes>,
@@ -122,6 +124,31 @@ impl History {
         Ok(Self { prints: Arc::new(prints), ..self })
     }
 
+    /// The same with these trades, each of which could be known at its place in `known`.
+    ///
+    /// # Errors
+    /// If these times go back, one lies before its trade or is missing, or a price or size is not above 0.
+    pub fn with_prints_known_at(self, prints: Vec<Print>, known: Vec<Timestamp>) -> Result<Self, HistoryError> {
+        check_order_of_times("trade", known.iter().copied())?;
+        for (row, print) in prints.iter().enumerate() {
+            check_print(row, print)?;
+            let (time, known_at) = (print.time, known.get(row).copied().unwrap_or(Timestamp::MIN));
+            if known_at < time {
+                return Err(HistoryError::Known { what: "trade", row, time, known_at });
+            }
+        }
+        let same = prints.iter().zip(&known).all(|(print, known)| print.time == *known);
+        let known = if same { Vec::new() } else { known };
+        Ok(Self { prints: Arc::new(prints), prints_known: Arc::new(known), ..self })
+    }
+
+    /// When trade `row` could be known.
+    #[must_use]
+    pub fn print_known_at(&self, row: usize) -> Option<Timestamp> {
+        let print = self.prints.get(row)?;
+        Some(self.prints_known.get(row).copied().unwrap_or(print.time))
+    }
+
     /// The same with these changes of the book, price by price.
     ///
     /// # Errors
@@ -167,7 +194,7 @@ impl History {
         &self.quotes
     }
 
-    /// Its trades, oldest first.
+    /// Its trades, in the order in which they were known.
     #[must_use]
     pub fn prints(&self) -> &[Print] {
         &self.prints
@@ -219,6 +246,7 @@ impl History {
         Self {
             bars: if self.bars.is_empty() { other.bars } else { self.bars },
             quotes: if self.quotes.is_empty() { other.quotes } else { self.quotes },
+            prints_known: if self.prints.is_empty() { other.prints_known } else { self.prints_known },
             prints: if self.prints.is_empty() { other.prints } else { self.prints },
             depth: if self.depth.is_empty() { other.depth } else { self.depth },
             order_events: if self.order_events.is_empty() { other.order_events } else { self.order_events },
@@ -235,10 +263,14 @@ impl History {
         for quote in (from..all.len()).map_while(|k| all.get(k)).take_while(|quote| quote.time <= end) {
             quotes.push(quote.time, quote.bids, quote.asks);
         }
+        let known = (0..self.prints.len()).filter_map(|row| Some((self.prints[row], self.print_known_at(row)?)));
+        let prints = cut(&known.collect::<Vec<_>>(), |(_, known)| *known, start, end);
+        let known = prints.iter().map(|(_, known)| *known).collect();
         Self {
             bars: Arc::new(cut(&self.bars, |bar| bar.known_at, start, end)),
             quotes: Arc::new(quotes),
-            prints: Arc::new(cut(&self.prints, |print| print.time, start, end)),
+            prints: Arc::new(prints.iter().map(|(print, _)| *print).collect()),
+            prints_known: Arc::new(if self.prints_known.is_empty() { Vec::new() } else { known }),
             depth: Arc::new(cut(&self.depth, |change| change.known_at, start, end)),
             order_events: Arc::new(cut(&self.order_events, |event| event.known_at, start, end)),
             notes: self.notes.clone(),

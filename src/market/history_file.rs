@@ -1,15 +1,19 @@
-//! Bars and quotes from files, held to what bars and quotes can be.
+//! Market data from whole files, held to what they can be: each is a stream that is read to its end.
 
-use crate::io::{FeedFormat, Increase, InputError, Table, check_increasing, check_not_negative, common_spacing};
+use std::path::Path;
+
+use crate::io::{FeedFormat, Increase, InputError, Layout, OnBad, Table, TableChunks, check_increasing, common_spacing};
 use crate::sim2real::Timestamp;
 
-use super::{Bar, Book, History, HistoryError, Level, Price, Quotes};
+use super::stream::{BarRows, bars_of};
+use super::{Bar, DataNotes, FileStream, History, HistoryError, Quotes, Side};
 
 /// The columns of a file of bars.
 pub(super) const BAR_COLUMNS: [&str; 6] = ["ts", "open", "high", "low", "close", "volume"];
 
 impl History {
-    /// Reads a file of bars: `ts, open, high, low, close, volume`; files of several days with gaps between are fine.
+    /// Reads a file of bars: `ts, open, high, low, close, volume`, or Lean's; files of several days with gaps between are
+    /// fine.
     ///
     /// A bar is `interval` [ns] long; where that is not declared, as long as the most common distance between two of
     /// them. It never reaches into the next: see [`Stamp::spans`](crate::io::Stamp::spans).
@@ -17,19 +21,16 @@ impl History {
     /// # Errors
     /// What cannot be read; no `stamp`; times that do not increase strictly; prices that are not above 0 or where not
     /// low <= open, close <= high; a negative volume; a single bar without `interval`, or bars closer than it.
-    pub fn read_bars(
-        path: impl AsRef<std::path::Path>,
-        format: &FeedFormat,
-        interval: Option<i64>,
-    ) -> Result<Self, InputError> {
+    pub fn read_bars(path: impl AsRef<Path>, format: &FeedFormat, interval: Option<i64>) -> Result<Self, InputError> {
         let table = Table::read_with(path, &format.columns)?;
-        table.check_renames(&BAR_COLUMNS)?;
-        let bars = bars(&table, format, interval)?;
-        Self::new(bars, Quotes::default()).map_err(|error| in_file(&table, &error, format.price_scale))
+        let ts = BarRows::time_column(format);
+        table.check_renames(&BAR_COLUMNS.map(|name| if name == "ts" { ts } else { name }))?;
+        let (bars, notes) = bars(&table, format, interval)?;
+        sound(table.path(), Self::new(bars, Quotes::default()), &notes)
     }
 
     /// Reads a file of quotes: `ts, bid, bid_size, ask, ask_size`, then `bid2, bid2_size, ask2, ask2_size` and so on to
-    /// ten levels, as far as there are columns.
+    /// ten levels, as far as there are columns; or what [`FileStream::quotes`] reads.
     ///
     /// A price that is 0 or empty, or a size of 0, is a side (or a deeper level) that is not there; an empty size is one
     /// that is not known, and counts as infinite. Several quotes may have one time; the last is the one that stands.
@@ -37,102 +38,115 @@ impl History {
     /// # Errors
     /// What cannot be read; times that go back; negative prices or sizes; a bid above the ask; deeper levels at better
     /// prices.
-    pub fn read_quotes(path: impl AsRef<std::path::Path>, format: &FeedFormat) -> Result<Self, InputError> {
-        let table = Table::read_with(path, &format.columns)?;
-        let names: Vec<[String; 4]> = (1..=Book::DEPTH)
-            .map(|k| ["bid", "ask"].map(|side| if k == 1 { side.to_owned() } else { format!("{side}{k}") }))
-            .map(|[bid, ask]| [bid.clone(), format!("{bid}_size"), ask.clone(), format!("{ask}_size")])
-            .collect();
-        let meaningful: Vec<&str> = std::iter::once("ts").chain(names.iter().flatten().map(String::as_str)).collect();
-        table.check_renames(&meaningful)?;
-        let times = table.times("ts", &format.time)?;
-        check_increasing(&table, "ts", &times, Increase::OrStays)?;
-        let (mut bids, mut asks) = (Vec::new(), Vec::new());
-        for (k, [bid, bid_size, ask, ask_size]) in names.iter().enumerate() {
-            // The first level must be there; a deeper one where either side has it.
-            if k == 0 || table.has(bid) {
-                bids.push(levels(&table, bid, bid_size, format.price_scale)?);
-            }
-            if k == 0 || table.has(ask) {
-                asks.push(levels(&table, ask, ask_size, format.price_scale)?);
-            }
-        }
-        let mut quotes = Quotes::with_depth(bids.len().max(asks.len()));
-        let (mut bid, mut ask) = (Vec::new(), Vec::new());
-        for (row, time) in times.into_iter().enumerate() {
-            for (side, of) in [(&mut bid, &bids), (&mut ask, &asks)] {
-                side.clear();
-                side.extend(of.iter().map_while(|level| level[row]));
-            }
-            quotes.push(time, &bid, &ask);
-        }
-        Self::new(Vec::new(), quotes).map_err(|error| in_file(&table, &error, format.price_scale))
+    pub fn read_quotes(path: impl AsRef<Path>, format: &FeedFormat) -> Result<Self, InputError> {
+        Self::read_quote_bars(path, format, None)
+    }
+
+    /// As [`read_quotes`](Self::read_quotes), of a file of quote bars of `interval` [ns].
+    ///
+    /// # Errors
+    /// As [`read_quotes`](Self::read_quotes).
+    pub fn read_quote_bars(path: impl AsRef<Path>, format: &FeedFormat, interval: Option<i64>) -> Result<Self, InputError> {
+        let mut stream = FileStream::quotes(path.as_ref(), format, interval, TableChunks::ROWS)?;
+        let mut quotes = Quotes::with_depth(stream.depth_of_levels());
+        while stream.next_rows(&mut |row| {
+            quotes.push(row.known_at, row.what.opposite(Side::Sell), row.what.opposite(Side::Buy));
+        })? {}
+        sound(path, Self::new(Vec::new(), quotes), stream.notes())
+    }
+
+    /// Reads a file of trades: `ts, price, size`, optional `aggressor`; or what [`FileStream::trades`] reads.
+    ///
+    /// # Errors
+    /// What cannot be read; times that go back; prices and sizes that are not above 0.
+    pub fn read_trades(path: impl AsRef<Path>, format: &FeedFormat) -> Result<Self, InputError> {
+        let mut stream = FileStream::trades(path.as_ref(), format, TableChunks::ROWS)?;
+        let (mut prints, mut known) = (Vec::new(), Vec::new());
+        while stream.next_rows(&mut |row| {
+            prints.push(row.what);
+            known.push(row.known_at);
+        })? {}
+        sound(path, Self::default().with_prints_known_at(prints, known), stream.notes())
+    }
+
+    /// Reads a file of changes of a book, price by price: what [`FileStream::depth`] reads.
+    ///
+    /// # Errors
+    /// What cannot be read; times that go back; prices that are not above 0, negative sizes, sides there are none of.
+    pub fn read_depth(path: impl AsRef<Path>, format: &FeedFormat) -> Result<Self, InputError> {
+        let mut stream = FileStream::depth(path.as_ref(), format, TableChunks::ROWS)?;
+        let mut depth = Vec::new();
+        while stream.next_rows(&mut |row| depth.push(row))? {}
+        sound(path, Self::default().with_depth(depth), stream.notes())
+    }
+
+    /// Reads a file of events of resting orders: what [`FileStream::order_events`] reads.
+    ///
+    /// # Errors
+    /// What cannot be read; times that go back; prices and sizes that are not above 0, actions and sides there are none of;
+    /// an order that is added twice.
+    pub fn read_order_events(path: impl AsRef<Path>, format: &FeedFormat) -> Result<Self, InputError> {
+        let mut stream = FileStream::order_events(path.as_ref(), format, TableChunks::ROWS)?;
+        let mut events = Vec::new();
+        while stream.next_rows(&mut |row| events.push(row))? {}
+        sound(path, Self::default().with_order_events(events), stream.notes())
     }
 }
 
-/// The bars of a table, of which each has its two times; prices are held to be above 0, and nothing else.
-pub(super) fn bars(table: &Table, format: &FeedFormat, interval: Option<i64>) -> Result<Vec<Bar>, InputError> {
+/// A history of rows that were held to the same before, each at its place.
+fn sound(path: impl AsRef<Path>, history: Result<History, HistoryError>, notes: &DataNotes) -> Result<History, InputError> {
+    let history = history.map_err(|error| {
+        let text = error.to_string();
+        let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
+        InputError::new(path, message).hint(hint)
+    })?;
+    Ok(history.with_notes(notes.clone()))
+}
+
+/// The bars of a table, and what was found in it.
+pub(super) fn bars(table: &Table, format: &FeedFormat, interval: Option<i64>) -> Result<(Vec<Bar>, DataNotes), InputError> {
     let Some(stamp) = format.stamp else {
         let error = InputError::new(table.path(), "nothing says which end of a bar its time names");
         return Err(error.hint("add stamp = \"open\" or stamp = \"close\" to the section that names the file"));
     };
-    let times = table.times("ts", &format.time)?;
-    check_increasing(table, "ts", &times, Increase::Strictly)?;
-    if let (Some(declared), Some(common)) = (interval, common_spacing(&times))
+    if !matches!(format.layout, Layout::Trueup | Layout::Lean) {
+        let error = InputError::new(table.path(), format!("the layout `{}` has no bars", format.layout.word()));
+        return Err(error.hint("bars are of the layout `trueup` or `lean`"));
+    }
+    let common = common_spacing(&increasing_times(table, format)?);
+    if let (Some(declared), Some(common)) = (interval, common)
         && common < declared
     {
         let message =
             format!("most bars are {} s apart, but `interval` says {} s", common as f64 / 1e9, declared as f64 / 1e9);
-        return Err(InputError::new(table.path(), message).in_column("ts").hint("give the length of one bar"));
+        let error = InputError::new(table.path(), message).in_column(BarRows::time_column(format));
+        return Err(error.hint("give the length of one bar"));
     }
-    let spans = stamp.spans(&times, interval).ok_or_else(|| {
+    let interval = interval.or(common).ok_or_else(|| {
         let error = InputError::new(table.path(), "one bar alone does not show how long a bar is");
         error.hint("declare it: interval = \"1m\" in [[data]]; the tape of a twin needs two bars at least")
     })?;
-    let [open, high, low, close] = ["open", "high", "low", "close"].map(|name| prices(table, name, format.price_scale));
-    let (open, high, low, close) = (open?, high?, low?, close?);
-    let volume = table.floats_complete("volume")?;
-    let bar = |(k, (open_at, known_at)): (usize, (Timestamp, Timestamp))| Bar {
-        open_at,
-        known_at,
-        open: open[k],
-        high: high[k],
-        low: low[k],
-        close: close[k],
-        volume: volume[k],
-    };
-    Ok(spans.into_iter().enumerate().map(bar).collect())
+    bars_of(table, format, BarRows::new(format, stamp, interval))
 }
 
-/// A column of prices, scaled.
-fn prices(table: &Table, name: &str, scale: f64) -> Result<Vec<Price>, InputError> {
-    let values = table.floats_complete(name)?;
-    let convert = |(row, value): (usize, f64)| {
-        if value <= 0.0 {
-            let error = table.error(name, row, "expected a price greater than 0").found(value);
-            return Err(error.hint("drop the row, or name the column that holds the price in `columns`"));
+/// The times of bars, without those that do not increase: whether there may be such is for the reader of the bars to say.
+fn increasing_times(table: &Table, format: &FeedFormat) -> Result<Vec<Timestamp>, InputError> {
+    let column = BarRows::time_column(format);
+    let times = match format.rules.on_bad {
+        OnBad::Refuse => {
+            let times = table.times(column, &format.time)?;
+            check_increasing(table, column, &times, Increase::Strictly)?;
+            return Ok(times);
         }
-        let too_large = |_| {
-            let error = table.error(name, row, "expected a price of at most 9.2e9").found(value * scale);
-            error.hint("is `price_scale` right?")
-        };
-        Price::nearest(value * scale).map_err(too_large)
+        OnBad::Drop => table.times_with_holes(column, &format.time)?,
     };
-    values.into_iter().enumerate().map(convert).collect()
-}
-
-/// One level of one side: none where it is not there.
-fn levels(table: &Table, price: &str, size: &str, scale: f64) -> Result<Vec<Option<Level>>, InputError> {
-    let (prices, sizes) = (table.floats(price)?, table.floats(size)?);
-    for (name, values) in [(price, &prices), (size, &sizes)] {
-        check_not_negative(table, name, values)
-            .map_err(|error| error.hint("0 or an empty cell is a side that is not there; drop the row or correct it"))?;
+    let mut increasing: Vec<Timestamp> = Vec::with_capacity(times.len());
+    for time in times.into_iter().flatten() {
+        if increasing.last().is_none_or(|last| *last < time) {
+            increasing.push(time);
+        }
     }
-    let level = |(price, size): (Option<f64>, Option<f64>)| {
-        let level = Level { price: price? * scale, size: size.unwrap_or(f64::INFINITY) };
-        (level.price > 0.0 && level.size > 0.0).then_some(level)
-    };
-    Ok(prices.into_iter().zip(sizes).map(level).collect())
+    Ok(increasing)
 }
 
 /// The error at its place in the file, in the file's own unit.

@@ -50,6 +50,7 @@ mod run_needs;
 mod run_page;
 mod session;
 mod strategy;
+mod stream;
 #[cfg(feature = "io")]
 pub mod sweep;
 mod tape;
@@ -106,6 +107,9 @@ pub use run::{PreparedRun, explained, prepare_run};
 pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
 pub use session::Session;
 pub use strategy::{Event, EventKind, News, Notice, Orders, Strategy, View};
+#[cfg(feature = "io")]
+pub use stream::FileStream;
+pub use stream::{Dated, Known, Stored, Stream, StreamError};
 pub use tape::{Print, Seen, Tape};
 #[cfg(feature = "io")]
 pub use tape_file::{TapeFiles, read_tape};

@@ -32,8 +32,8 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     venue(run)?;
     let mut inputs = vec![own_document(run)?];
     let mut read = Vec::new();
-    for (index, entry) in run.data.iter().enumerate() {
-        let history = history(run, index, entry)?;
+    for entry in &run.data {
+        let history = history(entry)?;
         let rows = history.rows();
         inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: Some(rows) });
         read.push(Some(history));
@@ -115,15 +115,13 @@ fn venue(run: &RunFile) -> Result<Assembly<Execution>, InputError> {
 }
 
 /// The history in a data file.
-fn history(run: &RunFile, index: usize, entry: &DataEntry) -> Result<History, InputError> {
+fn history(entry: &DataEntry) -> Result<History, InputError> {
     match entry.kind {
         FeedKind::Bars => History::read_bars(&entry.path, &entry.format, entry.interval),
         FeedKind::Quotes => History::read_quotes(&entry.path, &entry.format),
-        FeedKind::Trades | FeedKind::Book => {
-            let word = entry.kind.word();
-            let error = run.error(&["data", &index.to_string(), word], format!("a backtest does not run on `{word}` yet"));
-            Err(error.hint("give bars or quotes"))
-        }
+        FeedKind::Trades => History::read_trades(&entry.path, &entry.format),
+        FeedKind::Book if entry.format.layout.tells_orders() => History::read_order_events(&entry.path, &entry.format),
+        FeedKind::Book => History::read_depth(&entry.path, &entry.format),
     }
 }
 

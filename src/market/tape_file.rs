@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::io::{FeedFormat, InputError, Renames, Table};
 
-use super::history_file::{BAR_COLUMNS, bars, in_file};
-use super::{Bar, Book, History, Level, Print, Quotes, Side, Tape};
+use super::history_file::{BAR_COLUMNS, bars};
+use super::{Bar, Book, Level, Print, Quotes, Side, Tape};
 
 /// The files of a tape; those that are named are read.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -28,7 +28,7 @@ const CROSSED: f64 = 0.01;
 ///
 /// # Errors
 /// What [`Table::read`] refuses; missing columns, cells that are no numbers or times; negative prices and sizes, and in
-/// trades prices of 0; more than one crossed quote in a hundred; and what [`History::read_bars`] refuses of bars.
+/// trades prices of 0; more than one crossed quote in a hundred; and what [`History::read_bars`](super::History::read_bars) refuses of bars.
 pub fn read_tape(files: TapeFiles<'_>, format: &FeedFormat) -> Result<Tape, InputError> {
     let mut notes = Vec::new();
     let quotes = files.quotes.map(|path| read_quotes(path, format, &mut notes)).transpose()?.unwrap_or_default();
@@ -136,7 +136,5 @@ fn read_prints(path: &Path, format: &FeedFormat) -> Result<Vec<Print>, InputErro
 
 fn read_bars(path: &Path, format: &FeedFormat) -> Result<Vec<Bar>, InputError> {
     let table = open(path, format, |name| BAR_COLUMNS.contains(&name))?;
-    let bars = bars(&table, format, None)?;
-    let history = History::new(bars, Quotes::default()).map_err(|error| in_file(&table, &error, format.price_scale))?;
-    Ok(history.into_bars())
+    Ok(bars(&table, format, None)?.0)
 }

@@ -83,7 +83,8 @@ fn changed(history: &History, now: Timestamp, seed: Seed, number: usize) -> Hist
         quotes.push(quote.time, &moved(quote.bids), &moved(quote.asks));
     }
     let mut prints = history.prints().to_vec();
-    for print in prints.iter_mut().filter(|print| print.time > now) {
+    let known: Vec<Timestamp> = (0..prints.len()).filter_map(|row| history.print_known_at(row)).collect();
+    for (print, _) in prints.iter_mut().zip(&known).filter(|(_, known)| **known > now) {
         (print.price, print.size) = (print.price * factor(), print.size * factor());
     }
     let mut depth = history.depth().to_vec();
@@ -96,7 +97,7 @@ fn changed(history: &History, now: Timestamp, seed: Seed, number: usize) -> Hist
     }
     // What it was made of was a history, and prices stay above 0 and in order.
     History::new(bars, quotes)
-        .and_then(|history| history.with_prints(prints))
+        .and_then(|history| history.with_prints_known_at(prints, known))
         .and_then(|history| history.with_depth(depth))
         .and_then(|history| history.with_order_events(orders))
         .unwrap_or_default()
