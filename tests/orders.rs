@@ -243,3 +243,29 @@ fn a_stop_is_set_off_by_the_price_it_would_take() {
     let record = run(quotes(&rows), &[], event(0).submit(stop(Side::Buy, 1.0, 103.0)));
     assert_eq!(fills(&record), [(2, 1.0, 103.0)]);
 }
+
+/// 1,000 short at 10 from the second minute of the first day: charged at midnight, when it grows, and at the end.
+#[test]
+fn what_is_held_is_charged_for_the_time_it_was_held() {
+    let day = 1_440;
+    let all = [0, 1, 2, day, day + 1, 2 * day, 2 * day + 1].iter().map(|m| bar(*m, 10.0, 10.0, 1e6)).collect();
+    let history = trueup::market::History::new(all, Default::default()).unwrap();
+    let sell = |units: f64| Ticket::market(0, Side::Sell, quantity(units));
+    let plan = event(0).submit(sell(1_000.0)).at(3).submit(sell(1_000.0));
+    let record = run(history, &[("borrow_fee", "", 0.36)], plan);
+    // 0.36 a year of 360 days: 0.001 a day. 10,000 from minute 1 to minute 1,441, and 20,000 to minute 2,882.
+    let minutes = f64::from(day as i32);
+    let expected = 0.001 * (10_000.0 * (f64::from(1_441 - 1)) / minutes + 20_000.0 * f64::from(2_882 - 1_441) / minutes);
+    let charged = record.ledger.income()[0].charges.total().unwrap().to_f64();
+    assert!((charged - expected).abs() < 1e-6, "{charged} is not {expected}");
+    let equity = record.ledger.equity().unwrap().to_f64();
+    assert!((equity - (100_000.0 - charged)).abs() < 1e-9);
+    assert_eq!(record.equity.last().unwrap().equity, equity);
+}
+
+#[test]
+fn orders_for_an_auction_that_the_data_do_not_tell_are_refused() {
+    let order = Ticket::new(0, Side::Buy, quantity(1.0), OrderKind::MarketOnClose);
+    let record = run(quotes(&[(0, 99.0, 101.0), (1, 99.0, 101.0)]), &[], event(0).submit(order));
+    assert_eq!(record.blotter.rejected[&Reason::NoAuction], 1);
+}

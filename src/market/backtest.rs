@@ -4,8 +4,8 @@ use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
 use super::{
-    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, Matching, MoneyError, QueueModel,
-    Reference, Session, Strategy,
+    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError, Matching, MoneyError,
+    QueueModel, Reference, Session, Strategy,
 };
 
 /// A backtest, as it was set up.
@@ -75,6 +75,14 @@ pub enum BacktestError {
         place: String,
         /// What is wrong with it.
         error: MoneyError,
+    },
+    /// Something the account cannot book.
+    #[error("{place}: {error}")]
+    Account {
+        /// Where it came up.
+        place: String,
+        /// What is wrong.
+        error: LedgerError,
     },
     /// Mechanisms that give a price no market has.
     #[error(

@@ -7,8 +7,8 @@ use super::backtest::BacktestError;
 use super::session::Session;
 use super::venue::{Filled, Outcome, Resting, What};
 use super::{
-    Cash, Condition, Fill, FillCost, InFlight, Link, News, Notice, OpenOrder, Order, OrderId, Price, Quantity, Reason,
-    Rejection, Request, Role, Status, Ticket, TimeInForce, Trade, Why,
+    Cash, Condition, Fill, FillCost, InFlight, Link, News, Notice, OpenOrder, Order, OrderId, OrderKind, Price, Quantity,
+    Reason, Rejection, Request, Role, Status, Ticket, TimeInForce, Trade, Why,
 };
 
 /// Length of a day of UTC [ns].
@@ -55,6 +55,16 @@ impl Session<'_> {
         }
         if ticket.kind.prices().any(|price| price.0 <= 0 || !increments.on_tick(price)) {
             return Err(Reason::OffTick);
+        }
+        let at_auction = matches!(
+            ticket.kind,
+            OrderKind::MarketOnOpen
+                | OrderKind::LimitOnOpen { .. }
+                | OrderKind::MarketOnClose
+                | OrderKind::LimitOnClose { .. }
+        );
+        if at_auction && !self.venue.floors[ticket.instrument].by_bars() {
+            return Err(Reason::NoAuction);
         }
         if let TimeInForce::GoodTillDate(end) = ticket.time_in_force
             && end <= now
@@ -287,6 +297,7 @@ impl Session<'_> {
         let Some(k) = self.blotter.place(id) else { return Ok(None) };
         let news = match what {
             What::Filled(filled) => {
+                self.charge_held(instrument, at)?;
                 self.book(k, &outcome, &filled)?;
                 let own: Vec<f64> = self.pending_terms[terms..terms + count].to_vec();
                 for (mechanism, term) in self.venue.conceding.iter().zip(&own) {

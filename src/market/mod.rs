@@ -7,6 +7,7 @@ mod bar;
 mod blotter;
 mod book;
 mod calendar;
+mod carry;
 mod check;
 mod covariate;
 mod daily;

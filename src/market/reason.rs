@@ -20,6 +20,8 @@ pub enum Reason {
     NoPrice,
     /// It would take what is held beyond the run's largest leverage.
     Leverage,
+    /// It is for the open or the close, and the data tell neither: bars do, quotes do not.
+    NoAuction,
     /// Its time was over before it was sent.
     Late,
     /// It is linked with orders of another instrument, or with none.
@@ -55,6 +57,7 @@ impl Reason {
             Self::OffTick => "off_tick",
             Self::NoPrice => "no_price",
             Self::Leverage => "leverage",
+            Self::NoAuction => "no_auction",
             Self::Late => "late",
             Self::Unlinked => "unlinked",
             Self::UnknownOrder => "unknown_order",
@@ -79,6 +82,7 @@ impl fmt::Display for Reason {
             Self::OffTick => "a price is not above 0 or not on a tick",
             Self::NoPrice => "the instrument has had no price yet",
             Self::Leverage => "it would exceed the run's largest leverage",
+            Self::NoAuction => "it is for the open or the close, which its data do not tell",
             Self::Late => "its time was over before it was sent",
             Self::Unlinked => "it is linked with no order of its instrument",
             Self::UnknownOrder => "no order of that number works",

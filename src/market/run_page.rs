@@ -132,6 +132,9 @@ fn costs(metrics: &Metrics) -> Vec<Cost> {
         kinds.push(("spread to the touch", at_touch));
     }
     kinds.extend([("rounding to a tick", costs.rounding), ("commission", costs.fees)]);
+    if metrics.charges != 0.0 {
+        kinds.push(("holding", metrics.charges));
+    }
     let bps = |amount: f64| (costs.decided_value > 0.0).then(|| amount / costs.decided_value * 1e4);
     kinds.into_iter().map(|(kind, amount)| Cost { kind: kind.to_owned(), amount, bps: bps(amount) }).collect()
 }

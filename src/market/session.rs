@@ -8,6 +8,7 @@ use crate::sim2real::Timestamp;
 use super::agenda::{Agenda, Due, Phase};
 use super::backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 use super::blotter::Blotter;
+use super::carry::Carry;
 use super::desk::Pending;
 use super::known::Known;
 use super::latency::Clocks;
@@ -41,6 +42,7 @@ pub struct Session<'d> {
     /// The bar of each instrument whose open is on the agenda.
     expected: Vec<Option<usize>>,
     pub(super) ledger: Ledger,
+    pub(super) carry: Carry,
     pub(super) orders: Orders,
     pub(super) blotter: Blotter,
     equity: Vec<EquityPoint>,
@@ -116,6 +118,7 @@ impl<'d> Session<'d> {
             terms: Vec::new(),
             expected: vec![None; count],
             ledger: Ledger::new(cash, count),
+            carry: Carry::new(count),
             orders: Orders::default(),
             held: Held::default(),
             rows: 0,
@@ -175,7 +178,9 @@ impl<'d> Session<'d> {
                 _ => {}
             }
         }
-        if self.blotter.fills.len() > fills {
+        let cash = self.ledger.cash();
+        self.charge_all(end)?;
+        if self.blotter.fills.len() > fills || self.ledger.cash() != cash {
             let equity = self.ledger.equity().map_err(|error| BacktestError::Money { place: "the end".into(), error })?;
             self.equity.push(EquityPoint { time: end, equity: equity.to_f64() });
         }
@@ -277,6 +282,7 @@ impl<'d> Session<'d> {
     #[inline]
     fn show(&mut self, arrival: &Arrival, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {
         let event = arrival.event;
+        self.carry_over(event.time)?;
         self.learn(arrival, strategy.lookback().max(1)).map_err(|error| self.money(event, error))?;
         self.decide(event, strategy)
     }

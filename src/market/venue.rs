@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
 
-use super::{Book, DepthBook, Execution, InFlight, Increments, OrderKind, Quantity, Side};
+use super::{Book, DepthBook, Execution, InFlight, Increments, Quantity, Side};
 
 pub use path::Intrabar;
 pub use queue::QueueModel;
@@ -99,6 +99,8 @@ pub(super) struct Venue {
     pub floors: Vec<Floor>,
     /// Ids of the mechanisms that act on prices, in their order.
     pub conceding: Vec<&'static str>,
+    /// Whether anything is charged, on fills or on what is held.
+    pub charges: bool,
 }
 
 /// What a venue is made of beside its mechanisms.
@@ -134,6 +136,7 @@ impl Venue {
         let averages = assembly.modelled().contains(&"book_walk");
         let at_plant = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Plant);
         let conceding: Vec<&'static str> = at_plant.map(|about| about.name).collect();
+        let charges = assembly.mechanisms().any(|(row, ..)| row.about().site == Site::Observation);
         let floor = |(number, symbol): (usize, &&str)| {
             let run = assembly.run(&thetas, &still, setup.seed.child(symbol));
             let increments = setup.increments[number];
@@ -149,7 +152,7 @@ impl Venue {
             floor
         };
         let floors = setup.symbols.iter().enumerate().map(floor).collect();
-        Self { floors, conceding }
+        Self { floors, conceding, charges }
     }
 }
 
@@ -164,24 +167,6 @@ impl Floor {
                     self.meet_shown(k, at);
                 }
             }
-        }
-        self.sweep(at);
-    }
-
-    /// Orders for the opening or the close that no bar told apart: with quotes they trade with what is displayed then.
-    pub fn auction(&mut self, at: Timestamp, opens: bool) {
-        for k in 0..self.resting.len() {
-            let order = &mut self.resting[k];
-            let kind = match (order.kind, opens) {
-                (OrderKind::MarketOnOpen, true) | (OrderKind::MarketOnClose, false) => OrderKind::Market,
-                (OrderKind::LimitOnOpen { price }, true) | (OrderKind::LimitOnClose { price }, false) => {
-                    OrderKind::Limit { price }
-                }
-                _ => continue,
-            };
-            order.kind = kind;
-            order.time_in_force = super::TimeInForce::ImmediateOrCancel;
-            self.meet_shown(k, at);
         }
         self.sweep(at);
     }
@@ -224,11 +209,5 @@ impl Floor {
     #[inline]
     pub fn by_bars(&self) -> bool {
         self.by_bars
-    }
-
-    /// Prices at which orders of a side rest: only tests ask.
-    #[cfg(test)]
-    pub fn limits(&self, side: Side) -> Vec<super::Price> {
-        self.resting.iter().filter(|order| order.side == side).filter_map(|order| order.kind.limit()).collect()
     }
 }

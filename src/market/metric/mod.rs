@@ -68,6 +68,8 @@ pub struct Metrics {
     pub realised: f64,
     /// Gain on what is still held, at its last price, before fees [currency].
     pub unrealised: f64,
+    /// What was charged for holding, such as borrow fees and funding; negative where it paid [currency].
+    pub charges: f64,
     /// What trading cost.
     pub costs: Costs,
 }
@@ -169,6 +171,7 @@ impl Metrics {
             trading: Trading::of(&RoundTrip::of(record)?),
             realised,
             unrealised,
+            charges: charges(record)?,
             costs: Costs::of(&record.blotter),
         })
     }
@@ -178,6 +181,11 @@ fn hit_rate(fills: &[Fill]) -> Option<f64> {
     let gains: Vec<bool> = fills.iter().filter_map(|fill| fill.realised.map(|gain| gain > fill.fee)).collect();
     let hits = gains.iter().filter(|hit| **hit).count();
     defined(hits as f64 / gains.len() as f64)
+}
+
+/// What was charged for holding [currency].
+fn charges(record: &Record) -> Result<f64, MoneyError> {
+    record.ledger.income().iter().try_fold(0.0, |sum, income| Ok(sum + income.charges.total()?.to_f64()))
 }
 
 /// The number, where it is one.

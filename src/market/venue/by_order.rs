@@ -78,11 +78,6 @@ impl Floor {
             }
         }
     }
-
-    /// Events about orders that were not there, or were there already.
-    pub fn unknown_orders(&self) -> u64 {
-        self.others.unknown
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,61 @@
+//! What it costs to hold: positions are charged for the time they were held, by the same mechanisms that charge fills.
+
+use crate::sim2real::Timestamp;
+
+use super::backtest::BacktestError;
+use super::session::Session;
+use super::{Cash, ChargeKind, InFlight, LedgerError, Quantity, Role, Side};
+
+/// Length of a day of UTC [ns].
+const DAY: i64 = 86_400 * Timestamp::NANOS;
+
+/// Since when each position has not been charged.
+#[derive(Debug, Clone)]
+pub(super) struct Carry {
+    since: Vec<Timestamp>,
+    /// When all are charged next.
+    next: Timestamp,
+}
+
+impl Carry {
+    pub fn new(instruments: usize) -> Self {
+        Self { since: vec![Timestamp::MIN; instruments], next: Timestamp::MIN }
+    }
+}
+
+impl Session<'_> {
+    /// Charges all positions once a day of UTC, at the first event of the next.
+    #[inline]
+    pub(super) fn carry_over(&mut self, now: Timestamp) -> Result<(), BacktestError> {
+        if now < self.carry.next || !self.venue.charges {
+            return Ok(());
+        }
+        self.carry.next = Timestamp((now.0.div_euclid(DAY) + 1).saturating_mul(DAY));
+        self.charge_all(now)
+    }
+
+    /// Charges all positions up to `now`.
+    pub(super) fn charge_all(&mut self, now: Timestamp) -> Result<(), BacktestError> {
+        (0..self.carry.since.len()).try_for_each(|instrument| self.charge_held(instrument, now))
+    }
+
+    /// Charges what is held of `instrument` for the time since it was charged last: to be done before it changes.
+    pub(super) fn charge_held(&mut self, instrument: usize, now: Timestamp) -> Result<(), BacktestError> {
+        if !self.venue.charges {
+            return Ok(());
+        }
+        let since = std::mem::replace(&mut self.carry.since[instrument], now);
+        let position = self.ledger.positions()[instrument];
+        let Some(mark) = position.mark.filter(|_| position.quantity != Quantity::ZERO && since < now) else { return Ok(()) };
+        let side = if position.quantity > Quantity::ZERO { Side::Buy } else { Side::Sell };
+        let mid = mark.to_f64();
+        let held = InFlight::market(side, position.quantity.abs().to_f64(), since, mid, mid).as_a(Role::Holder);
+        let charge = self.venue.floors[instrument].charge(&held, mid, now);
+        let place = || format!("{} at {now}", self.setup.instruments[instrument].symbol);
+        let amount = Cash::nearest(charge).map_err(|error| BacktestError::Money { place: place(), error })?;
+        self.ledger.charge(instrument, amount, ChargeKind::Other).map_err(|error| match error {
+            LedgerError::Money(error) => BacktestError::Money { place: place(), error },
+            other => BacktestError::Account { place: place(), error: other },
+        })
+    }
+}
