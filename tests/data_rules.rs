@@ -157,7 +157,11 @@ fn changes_of_books_that_cannot_be() {
 fn order_events_that_cannot_be() {
     let format = FeedFormat::of_layout(Layout::TrueupOrders);
     for (bad, message, finding) in [
-        ("2,7,add,bid,9,1\n", "column `order_id`: expected an order that is not in the book yet, found 7", Finding::Duplicate),
+        (
+            "2,7,add,bid,9,1\n",
+            "column `order_id`: expected an order that is not in the book yet, found 7",
+            Finding::Duplicate,
+        ),
         ("2,-7,add,bid,9,1\n", "column `order_id`: expected an id that is not negative, found -7", Finding::Word),
         ("2,8,move,bid,9,1\n", "column `action`: expected `add`, `change` or `delete`, found \"move\"", Finding::Word),
         ("2,8,add,bid,9,0\n", "column `size`: expected a size above 0, found 0", Finding::Size),
@@ -167,7 +171,9 @@ fn order_events_that_cannot_be() {
         refused(ORDERS, &format, &text, message, finding);
     }
     // Orders that were placed before the file begins, and such as are gone.
-    let file = file("ts,order_id,action,side,price,size\n1,7,delete,bid,9,1\n2,8,add,ask,9,1\n3,8,delete,ask,9,1\n4,8,delete,ask,9,1\n");
+    let file = file(
+        "ts,order_id,action,side,price,size\n1,7,delete,bid,9,1\n2,8,add,ask,9,1\n3,8,delete,ask,9,1\n4,8,delete,ask,9,1\n",
+    );
     let history = History::read_order_events(&file.path, &format).unwrap();
     assert_eq!((history.order_events().len(), history.notes()[0].count(Finding::UnknownOrder)), (2, 2));
 }
@@ -206,10 +212,8 @@ fn gaps_and_symbols_that_vanish_are_counted() {
 
 #[test]
 fn clocks_that_go_back_or_do_not_agree() {
-    let format = |offset| FeedFormat {
-        clock: FeedClock { known_at: Some("seen".to_owned()), offset },
-        ..FeedFormat::default()
-    };
+    let format =
+        |offset| FeedFormat { clock: FeedClock { known_at: Some("seen".to_owned()), offset }, ..FeedFormat::default() };
     // The exchange's clock goes back: the rows are in the order in which they were known.
     let back = file("ts,seen,price,size\n5,10,9,1\n4,11,9,1\n6,12,9,1\n");
     let history = History::read_trades(&back.path, &format(ClockOffset::default())).unwrap();
@@ -218,7 +222,10 @@ fn clocks_that_go_back_or_do_not_agree() {
     // The local clock runs behind by 3: refused, mended, corrected by what is declared, or by what is estimated.
     let behind = file("ts,seen,price,size\n5,4,9,1\n10,7,9,1\n20,19,9,1\n");
     let error = History::read_trades(&behind.path, &format(ClockOffset::default())).unwrap_err().to_string();
-    assert!(error.contains("row 2, column `seen`: expected a time no earlier than 1970-01-01T00:00:00.000000005Z"), "{error}");
+    assert!(
+        error.contains("row 2, column `seen`: expected a time no earlier than 1970-01-01T00:00:00.000000005Z"),
+        "{error}"
+    );
     assert!(error.contains("clock_offset = \"estimate\""));
     let read = |format: &FeedFormat| {
         let history = History::read_trades(&behind.path, format).unwrap();
@@ -228,7 +235,8 @@ fn clocks_that_go_back_or_do_not_agree() {
     assert_eq!(read(&lenient(&format(ClockOffset::default()))), (vec![5, 10, 20], 3, Some(0)));
     assert_eq!(read(&format(ClockOffset::Declared(5))), (vec![9, 12, 24], 0, Some(5)));
     assert_eq!(read(&format(ClockOffset::Estimated)), (vec![7, 10, 22], 0, Some(3)));
-    let one_clock = FeedFormat { clock: FeedClock { known_at: None, offset: ClockOffset::Estimated }, ..FeedFormat::default() };
+    let one_clock =
+        FeedFormat { clock: FeedClock { known_at: None, offset: ClockOffset::Estimated }, ..FeedFormat::default() };
     assert!(History::read_trades(&behind.path, &one_clock).unwrap_err().to_string().contains("there is no second clock"));
 }
 
