@@ -14,6 +14,7 @@ mod journal;
 mod orders;
 mod run;
 mod scene;
+mod stream;
 mod table;
 mod trajectory;
 mod twin;
@@ -30,8 +31,9 @@ use scene::Scene;
 type Target = (&'static str, fn(&Scene, &[u8]));
 
 /// The targets, by their names, which are those of their folders in `fuzz/seeds`.
-const TARGETS: [Target; 13] = [
+const TARGETS: [Target; 15] = [
     ("arrow", columnar::arrow),
+    ("chunks", stream::chunks),
     ("csv", csv::plain),
     ("equations", equations::target),
     ("gzip", csv::compressed),
@@ -40,6 +42,7 @@ const TARGETS: [Target; 13] = [
     ("orders", orders::target),
     ("parquet", columnar::parquet),
     ("run", run::target),
+    ("stream", stream::target),
     ("tape", history::tape),
     ("trajectory", trajectory::target),
     ("twin", twin::target),

@@ -47,7 +47,8 @@ pub enum ClockOffset {
     /// So much [ns].
     Declared(i64),
     /// The least that lets nothing be known before it happened, and 0 where nothing is: an assumption of a fastest message
-    /// that took no time. The file is read twice.
+    /// that took no time. The file is read twice. Each file is estimated by itself: to compare the times of several files of
+    /// one recorder, declare the same number for all.
     Estimated,
 }
 

@@ -8,6 +8,7 @@ mod columnar_chunks;
 mod controller_entry;
 mod csv;
 mod csv_blocks;
+mod data_table;
 mod document;
 mod equation_sections;
 mod error;

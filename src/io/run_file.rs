@@ -6,20 +6,17 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 use chrono::DateTime;
-use chrono_tz::Tz;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
+use super::data_table::{DataTable, data_entry};
 use super::document::{Document, HINT};
-use super::error::{InputError, hint_among};
-use super::feed_format::{FeedFormat, check_file, zone};
+use super::error::InputError;
+use super::feed_format::{FeedFormat, check_file};
 use super::instrument_entry::{InstrumentEntry, check_instruments};
 use super::quantity::{MechanismEntry, check_mechanisms};
-use super::stamp::Stamp;
 use super::sweep_section::{SweepSection, SweepTable};
-use super::table::Renames;
-use super::time_format::TimeUnit;
 use super::twin_file::AssumedPrice;
 use crate::sim2real::Timestamp;
 
@@ -130,25 +127,6 @@ struct StrategyKind {
     kind: String,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DataTable {
-    symbol: String,
-    bars: Option<String>,
-    quotes: Option<String>,
-    trades: Option<String>,
-    book: Option<String>,
-    stamp: Option<Stamp>,
-    #[serde(default, deserialize_with = "interval")]
-    interval: Option<i64>,
-    #[serde(default, deserialize_with = "zone")]
-    zone: Option<Tz>,
-    price_scale: Option<f64>,
-    time_unit: Option<TimeUnit>,
-    #[serde(default)]
-    columns: Renames,
-}
-
 impl RunFile {
     /// Reads RUN.toml, and holds it to what can be held without reading the files it names; these must exist.
     ///
@@ -157,12 +135,17 @@ impl RunFile {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         let run = Self::parse(Document::read(path)?)?;
         for (index, data) in run.data.iter().enumerate() {
-            check_file(&run.document, &["data", &index.to_string(), data.kind.word()], &data.path.to_string_lossy())?;
+            let number = index.to_string();
+            check_file(&run.document, &["data", &number, data.kind.word()], &data.path.to_string_lossy())?;
+            if let Some(snapshot) = &data.format.snapshot {
+                check_file(&run.document, &["data", &number, "snapshot"], &snapshot.to_string_lossy())?;
+            }
         }
-        Ok(Self {
-            data: run.data.into_iter().map(|d| DataEntry { path: run.document.resolve(&d.path), ..d }).collect(),
-            ..run
-        })
+        let resolved = |data: DataEntry| {
+            let snapshot = data.format.snapshot.as_ref().map(|path| run.document.resolve(path));
+            DataEntry { path: run.document.resolve(&data.path), format: FeedFormat { snapshot, ..data.format }, ..data }
+        };
+        Ok(Self { data: run.data.into_iter().map(resolved).collect(), ..run })
     }
 
     /// The run of a document; the files it names are neither looked for nor resolved.
@@ -189,7 +172,7 @@ impl RunFile {
         let data = data
             .into_iter()
             .enumerate()
-            .map(|(index, table)| data_entry(&document, &index.to_string(), table, &instrument))
+            .map(|(index, table)| data_entry(&document, &index.to_string(), table, &instrument, run.end))
             .collect::<Result<Vec<_>, _>>()?;
         if data.is_empty() {
             return Err(document.error(&[], "the run names no data").hint("add a [[data]] section"));
@@ -248,54 +231,6 @@ impl RunFile {
     pub fn error(&self, keys: &[&str], message: impl Into<String>) -> InputError {
         self.document.error(keys, message)
     }
-}
-
-fn data_entry(
-    document: &Document,
-    number: &str,
-    table: DataTable,
-    instruments: &[InstrumentEntry],
-) -> Result<DataEntry, InputError> {
-    let keys = ["data", number];
-    let kinds = [
-        (FeedKind::Bars, table.bars),
-        (FeedKind::Quotes, table.quotes),
-        (FeedKind::Trades, table.trades),
-        (FeedKind::Book, table.book),
-    ];
-    let mut named = kinds.into_iter().filter_map(|(kind, path)| path.map(|path| (kind, path)));
-    let (Some((kind, path)), None) = (named.next(), named.next()) else {
-        return Err(document
-            .error(&keys, "expected exactly one of `bars`, `quotes`, `trades` and `book`")
-            .hint("a second file of the same instrument has a [[data]] section of its own"));
-    };
-    if !instruments.iter().any(|i| i.symbol == table.symbol) {
-        let symbols: Vec<&str> = instruments.iter().map(|i| i.symbol.as_str()).collect();
-        let hint = hint_among(&table.symbol, &symbols).unwrap_or_else(|| "add an [[instrument]] section".to_owned());
-        let message = format!("there is no [[instrument]] with the symbol `{}`", table.symbol);
-        return Err(document.error(&["data", number, "symbol"], message).hint(hint));
-    }
-    let format = FeedFormat::of(table.stamp, table.zone, table.time_unit, table.price_scale, table.columns);
-    format.check(document, &keys, kind == FeedKind::Bars)?;
-    if table.interval.is_some() && kind != FeedKind::Bars {
-        let error = document.error(&["data", number, "interval"], "only bars have an `interval`");
-        return Err(error.hint("drop the key"));
-    }
-    Ok(DataEntry { symbol: table.symbol, kind, path: PathBuf::from(&path), named: path, format, interval: table.interval })
-}
-
-/// Reads the length of a bar [ns]: a whole number and one of s, m, h, d.
-fn interval<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<i64>, D::Error> {
-    let text = String::deserialize(deserializer)?;
-    let units = [("s", 1), ("m", 60), ("h", 3_600), ("d", 86_400)];
-    let length = units.iter().find_map(|(unit, seconds)| {
-        let count: i64 = text.strip_suffix(unit)?.trim().parse().ok().filter(|count| *count > 0)?;
-        count.checked_mul(seconds * Timestamp::NANOS)
-    });
-    length.map(Some).ok_or_else(|| {
-        let hint = "a whole number and a unit: \"1s\", \"5m\", \"1h\", \"1d\"";
-        D::Error::custom(format!("invalid value: {text:?}, expected the length of a bar{HINT}{hint}"))
-    })
 }
 
 /// Reads an instant: RFC 3339, as a text or as TOML writes it by itself.

@@ -193,6 +193,12 @@ pub(super) fn price(column: &str, values: &[Option<f64>], row: usize, scale: f64
     })
 }
 
+/// A price that is not exact, in `scale` [currency]: scaled, it is the nearest number to the decimal that was meant.
+pub(super) fn scaled(value: f64, scale: f64) -> f64 {
+    let product = value * scale;
+    if scale == 1.0 { product } else { Price::nearest(product).map_or(product, Price::to_f64) }
+}
+
 /// The size in such a cell, in `scale` [units]: 0 or more.
 pub(super) fn size(column: &str, values: &[Option<f64>], row: usize, scale: f64) -> Result<f64, Fault> {
     let value = number(column, values, row)?;

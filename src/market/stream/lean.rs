@@ -8,7 +8,7 @@ use crate::market::{Book, Finding, Level, Print};
 use crate::sim2real::Timestamp;
 
 use super::Known;
-use super::decode::{Decode, Emit, Fault, number, size, time};
+use super::decode::{Decode, Emit, Fault, number, scaled, size, time};
 use super::print_rows::{above_zero, trade_price};
 use super::quote_rows::told;
 
@@ -57,7 +57,7 @@ fn level(names: [&str; 2], values: &[Vec<Option<f64>>; 2], row: usize, scale: f6
         let hint = "0 is a side that the row does not tell of; drop the row or correct it";
         return Err(Fault::cell(Finding::Price, names[0], "expected a number that is not negative", price, hint));
     }
-    let level = Level { price: price * scale, size: size(names[1], &values[1], row, 1.0)? };
+    let level = Level { price: scaled(price, scale), size: size(names[1], &values[1], row, 1.0)? };
     if level.price > 0.0 && !can_be_price(level.price) {
         let message = "expected a price of at most 9.2e9";
         return Err(Fault::cell(Finding::Price, names[0], message, level.price, "is `price_scale` right?"));
@@ -110,7 +110,9 @@ impl Decode<Known<Book>> for LeanQuotes {
             let (bids, asks) = (bid.as_slice(), ask.as_slice());
             let sound = check_quote(row, bids, asks).map_err(|_| {
                 let hint = "quotes of several exchanges may cross: on_bad = \"drop\" leaves them out";
-                let price = asks.first().map_or(0.0, |level| level.price);
+                let price = asks.first().map_or(0.0, |level| level.price / scale);
+                // In the file's own unit, without what the division adds.
+                let price = (price * 1e6).round() / 1e6;
                 Fault::cell(Finding::Crossed, names[1][0], "the bid is above the ask", price, hint)
             });
             if emit.sound(row, sound)?.is_none() {

@@ -6,7 +6,7 @@ use crate::market::{Finding, Print, Side};
 
 use super::Known;
 use super::clocks::Clocks;
-use super::decode::{Decode, Emit, Fault, number};
+use super::decode::{Decode, Emit, Fault, number, scaled};
 
 /// Reads trades.
 pub(in crate::market) struct PrintRows {
@@ -57,7 +57,7 @@ pub(super) fn above_zero(finding: Finding, column: &str, values: &[Option<f64>],
 
 /// The price of a trade, in `scale` [currency].
 pub(super) fn trade_price(column: &str, values: &[Option<f64>], row: usize, scale: f64) -> Result<f64, Fault> {
-    let price = above_zero(Finding::Price, column, values, row)? * scale;
+    let price = scaled(above_zero(Finding::Price, column, values, row)?, scale);
     if can_be_price(price) {
         return Ok(price);
     }

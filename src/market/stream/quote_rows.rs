@@ -6,7 +6,7 @@ use crate::market::{Book, Finding, Level};
 
 use super::Known;
 use super::clocks::Clocks;
-use super::decode::{Decode, Emit, Fault};
+use super::decode::{Decode, Emit, Fault, scaled};
 
 /// Reads quotes.
 pub(in crate::market) struct QuoteRows {
@@ -51,7 +51,7 @@ impl LevelColumns<'_> {
             }
         }
         let Some(price) = price else { return Ok(None) };
-        let level = Level { price: price * scale, size: size.unwrap_or(f64::INFINITY) };
+        let level = Level { price: scaled(price, scale), size: size.unwrap_or(f64::INFINITY) };
         Ok((level.price > 0.0 && level.size > 0.0).then_some(level))
     }
 }

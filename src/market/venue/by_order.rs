@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 
 use crate::market::{DepthBook, OrderAction, OrderEvent, Price, Side};
-use crate::sim2real::Timestamp;
 
 use super::floor::Floor;
 use super::shown::Shown;
@@ -14,14 +13,16 @@ struct Other {
     side: Side,
     price: Price,
     size: f64,
-    /// When it took its place in the queue.
-    since: Timestamp,
+    /// Number of the event by which it took its place in the queue.
+    since: u64,
 }
 
 /// The orders of others that rest now.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(in crate::market) struct Others {
     orders: HashMap<u64, Other>,
+    /// Events so far.
+    events: u64,
     /// Changes of orders that were never added, or added twice.
     unknown: u64,
 }
@@ -31,10 +32,15 @@ struct Left {
     side: Side,
     price: Price,
     size: f64,
-    since: Timestamp,
+    since: u64,
 }
 
 impl Others {
+    /// Events so far.
+    pub(super) fn events(&self) -> u64 {
+        self.events
+    }
+
     /// Takes in an event, for the book alone.
     pub fn show(&mut self, event: &OrderEvent, book: &mut DepthBook) {
         self.apply(event, book);
@@ -42,7 +48,8 @@ impl Others {
 
     /// Takes in an event, and says what it took out of a queue.
     fn apply(&mut self, event: &OrderEvent, book: &mut DepthBook) -> Option<Left> {
-        let new = Other { side: event.side, price: event.price, size: event.size, since: event.time };
+        self.events += 1;
+        let new = Other { side: event.side, price: event.price, size: event.size, since: self.events };
         let old = match event.action {
             OrderAction::Delete => self.orders.remove(&event.id),
             OrderAction::Add | OrderAction::Change => {
@@ -73,7 +80,7 @@ impl Floor {
         let Shown::Depth(book) = &mut self.shown else { return };
         let Some(left) = self.others.apply(event, book) else { return };
         for order in &mut self.resting {
-            if order.side == left.side && order.limit() == Some(left.price) && left.since < order.order.arrives_at {
+            if order.side == left.side && order.limit() == Some(left.price) && left.since <= order.place.joined_after {
                 order.place.left_ahead(left.size);
             }
         }
@@ -98,10 +105,10 @@ mod tests {
         let mut others = Others::default();
         let price = Price(10_000_000_000);
         let mut event = |time: i64, id, action, size: f64| {
-            let at = Timestamp(time);
+            let at = crate::sim2real::Timestamp(time);
             let event = OrderEvent { time: at, known_at: at, id, action, side: Side::Buy, price, size };
             let left = others.apply(&event, &mut book);
-            (left.map(|left| (left.size, left.since.0)), book.size(Side::Buy, price))
+            (left.map(|left| (left.size, left.since)), book.size(Side::Buy, price))
         };
         assert_eq!(event(1, 7, OrderAction::Add, 5.0), (None, 5.0));
         assert_eq!(event(2, 8, OrderAction::Add, 3.0), (None, 8.0));

@@ -105,7 +105,7 @@ impl Floor {
     pub(super) fn join(&mut self, k: usize, _at: Timestamp) {
         let order = &self.resting[k];
         if let (OrderKind::Limit { price }, true) = (order.kind, order.place == Place::default()) {
-            self.resting[k].place = Place::behind(self.shown.displayed_at(order.side, price));
+            self.resting[k].place = Place::behind(self.shown.displayed_at(order.side, price), self.others.events());
         }
     }
 

@@ -74,14 +74,16 @@ pub(in crate::market) struct Place {
     pub(super) ahead: f64,
     /// What stood ahead when it joined [units].
     pub(super) joined_behind: f64,
+    /// How many events of single orders there had been when it joined: whoever joined by one of these stands ahead.
+    pub(super) joined_after: u64,
     /// What was traded at the price since it was last said what is displayed there [units].
     traded: f64,
 }
 
 impl Place {
     /// At the end of a queue of `displayed` [units].
-    pub fn behind(displayed: f64) -> Self {
-        Self { ahead: displayed, joined_behind: displayed, traded: 0.0 }
+    pub fn behind(displayed: f64, joined_after: u64) -> Self {
+        Self { ahead: displayed, joined_behind: displayed, joined_after, traded: 0.0 }
     }
 
     /// `size` [units] are traded at its price: what of it reaches the order.
@@ -125,7 +127,7 @@ mod tests {
     fn cancellations_are_shared_as_the_model_says() {
         // 60 ahead and 40 behind; 10 are cancelled.
         let after = |model: QueueModel| {
-            let mut place = Place::behind(60.0);
+            let mut place = Place::behind(60.0, 0);
             place.displayed(model, 100.0, 90.0);
             place.ahead
         };
@@ -139,7 +141,7 @@ mod tests {
 
     #[test]
     fn what_was_traded_is_not_counted_again_as_cancelled() {
-        let mut place = Place::behind(60.0);
+        let mut place = Place::behind(60.0, 0);
         assert_eq!(place.traded(25.0), 0.0);
         assert_eq!(place.ahead, 35.0);
         place.displayed(QueueModel::Proportional, 100.0, 75.0);
@@ -159,7 +161,7 @@ mod tests {
                 (0.1..5.0_f64).prop_map(|exponent| QueueModel::Power { exponent })
             ],
         ) {
-            let (mut place, mut shown) = (Place::behind(start), start);
+            let (mut place, mut shown) = (Place::behind(start, 0), start);
             for (trade, size) in steps {
                 let before = place.ahead;
                 if trade {
