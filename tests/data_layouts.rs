@@ -106,7 +106,7 @@ fn binance_trades_name_the_maker_and_the_other_side_took() {
     let history = History::read_trades(files.write("t.csv", &format!("{header}{rows}")), &format).unwrap();
     let took: Vec<_> = history.prints().iter().map(|print| print.aggressor).collect();
     assert_eq!(took, [Some(Side::Sell), Some(Side::Buy)]);
-    assert_eq!(history.prints()[0].time, Timestamp(1_500_000));
+    assert_eq!((history.prints()[0].time, history.print_known_at(0)), (Timestamp(1_000_000), Some(Timestamp(1_500_000))));
     let again = files.write("again.csv", &format!("{header}{rows}3500000,3,3,8,101,3,false,MARKET\n"));
     let error = History::read_trades(&again, &format).unwrap_err().to_string();
     assert!(error.contains("row 4, column `trade_id`: expected more than 8, found 8"), "{error}");

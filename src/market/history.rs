@@ -10,8 +10,8 @@ use super::{Bar, DataNotes, DepthChange, OrderEvent, Print, Quotes};
 /// Bars, quotes, trades and changes of the book of one instrument, each in the order in which they could be known. It was
 /// made by its own checks, so that what reads it need not check again. A clone shares them: many runs on the same data hold them once.
 ///
-/// The `time` of a quote and of a trade is here the time at which it could be known: a backtest that shows them by it shows
-/// nothing early. Changes of the book and order events have both times.
+/// The `time` of a quote is here the time at which it could be known: a backtest that shows it by that shows nothing early.
+/// Trades, changes of the book and order events have both times.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct History {
     bars: Arc<Vec<Bar>>,

@@ -33,10 +33,13 @@ pub(in crate::market) trait Decode<T>: Send {
     }
 }
 
+/// The error of a row of a table.
+type Explain = dyn Fn(&Table, usize) -> InputError;
+
 /// Why a row cannot be. Its words are made where they are asked for: a file may have many such rows.
 pub(in crate::market) struct Fault {
     finding: Finding,
-    explain: Box<dyn Fn(&Table, usize) -> InputError>,
+    explain: Box<Explain>,
 }
 
 impl Fault {

@@ -53,7 +53,7 @@ impl QueueModel {
     }
 
     /// The part of what was cancelled that stood behind, with `ahead` and `behind` [units].
-    fn from_behind(self, ahead: f64, behind: f64) -> f64 {
+    fn part_behind(self, ahead: f64, behind: f64) -> f64 {
         let of = |f: fn(f64, f64) -> f64, n: f64| {
             let (a, b) = (f(ahead, n), f(behind, n));
             if a + b > 0.0 { b / (a + b) } else { 1.0 }
@@ -105,7 +105,7 @@ impl Place {
         let cancelled = untraded - after;
         if cancelled > 0.0 && self.ahead > 0.0 {
             let behind = (untraded - self.ahead).max(0.0);
-            let from_behind = (model.from_behind(self.ahead, behind) * cancelled).min(behind);
+            let from_behind = (model.part_behind(self.ahead, behind) * cancelled).min(behind);
             self.ahead = (self.ahead - (cancelled - from_behind)).max(0.0);
         }
         // No more can be ahead than is there at all.

@@ -4,6 +4,7 @@ use crate::market::{Book, DepthBook, Level, Price, Reference, Side};
 use crate::sim2real::Timestamp;
 
 /// What the market shows of one instrument at the moment, as far as its data know.
+#[allow(clippy::large_enum_variant, reason = "a quote is replaced at every row: it must not be allocated")]
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Shown {
     /// Nothing yet.
