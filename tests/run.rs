@@ -334,11 +334,7 @@ fn a_run_that_cannot_be_is_said_with_place_and_remedy() {
     ");
     insta::assert_snapshot!(with("tick_size = 0.01", "tick_size = 0.01\n[[instrument]]\nsymbol = 'ABC'\ntick_size = 0.01"), @"
     run.toml:9:1: there are no data of `ABC`
-      hint: add [[data]] with its symbol and bars or quotes, or drop the instrument
-    ");
-    insta::assert_snapshot!(with("bars = 'bars.csv'\nstamp = 'open'", "trades = 'bars.csv'"), @"
-    run.toml:11:1: a backtest does not run on `trades` yet
-      hint: give bars or quotes
+      hint: add [[data]] with its symbol and bars, quotes, trades or book, or drop the instrument
     ");
     insta::assert_snapshot!(with("stamp = 'open'", "stamp = 'open'\ninterval = '1h'"), @"
     bars.csv: column `ts`: most bars are 60 s apart, but `interval` says 3600 s

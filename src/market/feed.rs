@@ -39,6 +39,7 @@ impl Rows<'_> {
     }
 
     /// When the row can be known.
+    #[inline]
     fn known_at(&self, row: usize) -> Timestamp {
         match self {
             Self::Prints(_, history) => history.print_known_at(row).unwrap_or(Timestamp::MAX),
@@ -50,6 +51,7 @@ impl Rows<'_> {
 
     /// One row behind the last of those that belong to the same instant as `row`: a book is told in many changes, and is
     /// whole when all of one instant are in.
+    #[inline]
     fn batch(&self, row: usize) -> usize {
         match self {
             Self::Depth(rows) => row + rows[row..].iter().take_while(|change| change.time == rows[row].time).count(),

@@ -251,7 +251,7 @@ impl<'d> Session<'d> {
             }
             EventKind::Timer => {}
         }
-        self.settle(instrument)
+        if self.venue.floors[instrument].is_quiet() { Ok(()) } else { self.settle(instrument) }
     }
 
     /// Puts the open of the next bar on the agenda, where an order waits for it.
@@ -287,6 +287,7 @@ impl<'d> Session<'d> {
         self.decide(event, strategy)
     }
 
+    #[inline]
     fn decide(&mut self, event: Event, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {
         let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
         self.account(event.time, equity);
@@ -296,6 +297,7 @@ impl<'d> Session<'d> {
         Ok(event)
     }
 
+    #[inline]
     fn view(&mut self, event: Event, equity: Cash) -> (View<'_>, &mut Orders) {
         let view = View {
             event,
