@@ -25,7 +25,7 @@ pub struct TableChunks {
 }
 
 enum Source {
-    Csv(CsvBlocks),
+    Csv(Box<CsvBlocks>),
     Columnar(Box<ColumnarChunks>),
 }
 
@@ -46,10 +46,10 @@ impl TableChunks {
     pub fn open(path: impl AsRef<Path>, renames: &Renames, rows: usize) -> Result<Self, InputError> {
         let path = path.as_ref();
         let source = match Ending::of(path)? {
-            Ending::Csv => Source::Csv(CsvBlocks::new(path, Box::new(open(path)?), unreadable, rows)),
+            Ending::Csv => Source::Csv(Box::new(CsvBlocks::new(path, Box::new(open(path)?), unreadable, rows))),
             Ending::CsvGz => {
                 let unzipped = flate2::read::MultiGzDecoder::new(open(path)?);
-                Source::Csv(CsvBlocks::new(path, Box::new(unzipped), no_gzip, rows))
+                Source::Csv(Box::new(CsvBlocks::new(path, Box::new(unzipped), no_gzip, rows)))
             }
             Ending::Columnar(container) => {
                 Source::Columnar(Box::new(ColumnarChunks::new(path, open(path)?, container, rows)?))

@@ -36,8 +36,11 @@ pub(in crate::market) trait Decode<T>: Send {
 /// Why a row cannot be. Its words are made where they are asked for: a file may have many such rows.
 pub(in crate::market) struct Fault {
     finding: Finding,
-    explain: Box<dyn Fn(&Table, usize) -> InputError>,
+    explain: Box<Explain>,
 }
+
+/// Says what is wrong with a data row of a table.
+type Explain = dyn Fn(&Table, usize) -> InputError;
 
 impl Fault {
     pub(super) fn new(finding: Finding, explain: impl Fn(&Table, usize) -> InputError + 'static) -> Self {
