@@ -209,22 +209,25 @@ impl DataNotes {
         self.ended_early
     }
 
-    pub(super) fn read(&mut self, rows: u64) {
+    /// `rows` more rows were read.
+    pub fn read(&mut self, rows: u64) {
         self.rows += rows;
     }
 
-    pub(super) fn found(&mut self, finding: Finding) {
+    /// `finding` was found of a row.
+    pub fn found(&mut self, finding: Finding) {
         if let Some(count) = self.counts.get_mut(finding as usize) {
             *count += 1;
         }
     }
 
-    pub(super) fn set_clock_offset(&mut self, offset: i64) {
+    /// So much is added to the local clock [ns].
+    pub fn set_clock_offset(&mut self, offset: i64) {
         self.clock_offset = Some(offset);
     }
 
-    /// A row that is kept was known at `time`.
-    pub(super) fn gave(&mut self, time: Timestamp, max_gap: Option<i64>) {
+    /// A row that is kept was known at `time`; a silence before it of more than `max_gap` [ns] is counted.
+    pub fn gave(&mut self, time: Timestamp, max_gap: Option<i64>) {
         self.kept += 1;
         if let Some(before) = self.last.replace(time) {
             let silence = time - before;
@@ -235,8 +238,8 @@ impl DataNotes {
         }
     }
 
-    /// The file is at its end, and should have reached to `until`.
-    pub(super) fn end(&mut self, until: Option<Timestamp>, max_gap: Option<i64>) {
+    /// The data are at their end, and should have reached to `until`, or up to `max_gap` [ns] before.
+    pub fn end(&mut self, until: Option<Timestamp>, max_gap: Option<i64>) {
         let late = |last: Timestamp| until.is_some_and(|until| until - last > max_gap.unwrap_or(i64::MAX));
         self.ended_early = self.last.is_some_and(late);
     }

@@ -89,8 +89,8 @@ impl Decode<Known<Book>> for LeanQuotes {
         let times = table.times_with_holes(TS, &self.time)?;
         let [bid, ask] = names.map(|side| Ok::<_, InputError>([table.floats(side[0])?, table.floats(side[1])?]));
         let (values, flags) = ([bid?, ask?], flags(table)?);
-        for (row, suspicious) in flags.into_iter().enumerate() {
-            if suspicious {
+        for (row, flagged) in flags.into_iter().enumerate() {
+            if flagged {
                 emit.found(Finding::Suspicious);
                 continue;
             }
@@ -150,8 +150,8 @@ impl Decode<Known<Print>> for LeanPrints {
     fn decode(&mut self, table: &Table, emit: &mut Emit<'_, Known<Print>>) -> Result<(), InputError> {
         let times = table.times_with_holes(TS, &self.time)?;
         let (prices, sizes, flags) = (table.floats("price_x10000")?, table.floats("qty")?, flags(table)?);
-        for (row, suspicious) in flags.into_iter().enumerate() {
-            if suspicious {
+        for (row, flagged) in flags.into_iter().enumerate() {
+            if flagged {
                 emit.found(Finding::Suspicious);
                 continue;
             }
