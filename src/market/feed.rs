@@ -190,7 +190,7 @@ impl<'d> Feed<'d> {
 impl Iterator for Feed<'_> {
     type Item = Arrival;
 
-    #[inline]
+    #[inline(always)]
     fn next(&mut self) -> Option<Arrival> {
         let time = self.peek()?;
         let winner = self.losers[0];

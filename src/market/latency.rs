@@ -239,11 +239,6 @@ impl Clocks {
         }
     }
 
-    /// Whether data reach the strategy at once.
-    pub fn feed_is_direct(&self) -> bool {
-        self.latencies.feed.is_none()
-    }
-
     /// Whether anybody wants to know how strained the market is.
     pub fn watches(&self) -> bool {
         self.latencies.strain != Strain::default()

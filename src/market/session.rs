@@ -24,6 +24,8 @@ pub struct Session<'d> {
     pub(super) setup: &'d Backtest,
     feed: Feed<'d>,
     transit: Transit,
+    /// Data take no time to the strategy but what their own two times say.
+    direct: bool,
     pub(super) agenda: Agenda,
     pub(super) clocks: Clocks,
     pub(super) known: Vec<Known>,
@@ -104,6 +106,7 @@ impl<'d> Session<'d> {
             feed,
             transit: Transit::new(count),
             agenda: Agenda::default(),
+            direct: latencies.feed.is_none(),
             clocks: Clocks::new(latencies, seed),
             known,
             daily: vec![Daily::default(); count],
@@ -141,7 +144,11 @@ impl<'d> Session<'d> {
     pub fn step(&mut self, strategy: &mut dyn Strategy) -> Result<Option<Event>, BacktestError> {
         loop {
             let (data, shown) = (self.feed.peek(), self.transit.peek());
-            let Some(next) = data.into_iter().chain(shown).min() else { return Ok(None) };
+            let next = match (data, shown) {
+                (Some(data), Some(shown)) => data.min(shown),
+                (Some(next), None) | (None, Some(next)) => next,
+                (None, None) => return Ok(None),
+            };
             if self.agenda.peek().is_some_and(|due| due < (next, Phase::Data)) {
                 if let Some(event) = self.act(Some(strategy))? {
                     return Ok(Some(event));
@@ -152,7 +159,7 @@ impl<'d> Session<'d> {
                 let Some(arrival) = self.feed.next() else { return Ok(None) };
                 self.rows += arrival.end - arrival.row;
                 self.happen(&arrival)?;
-                if self.clocks.feed_is_direct() && arrival.known_at <= next {
+                if self.direct && arrival.known_at <= next {
                     return self.show(&arrival, strategy).map(Some);
                 }
                 self.transit.put(self.clocks.shown(arrival.known_at), arrival);
@@ -215,7 +222,7 @@ impl<'d> Session<'d> {
     }
 
     /// Something happens at the exchange: orders that wait there meet it.
-    #[inline]
+    #[inline(always)]
     fn happen(&mut self, arrival: &Arrival) -> Result<(), BacktestError> {
         let Event { time, instrument, kind } = arrival.event;
         let history = &self.setup.histories[instrument];
@@ -279,7 +286,7 @@ impl<'d> Session<'d> {
     }
 
     /// Shows the strategy what became known, and sends what it asks for.
-    #[inline]
+    #[inline(always)]
     fn show(&mut self, arrival: &Arrival, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {
         let event = arrival.event;
         self.carry_over(event.time)?;
@@ -287,7 +294,7 @@ impl<'d> Session<'d> {
         self.decide(event, strategy)
     }
 
-    #[inline]
+    #[inline(always)]
     fn decide(&mut self, event: Event, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {
         let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
         self.account(event.time, equity);
@@ -297,7 +304,7 @@ impl<'d> Session<'d> {
         Ok(event)
     }
 
-    #[inline]
+    #[inline(always)]
     fn view(&mut self, event: Event, equity: Cash) -> (View<'_>, &mut Orders) {
         let view = View {
             event,
@@ -310,7 +317,7 @@ impl<'d> Session<'d> {
         (view, &mut self.orders)
     }
 
-    #[inline]
+    #[inline(always)]
     fn send_asked(&mut self, now: Timestamp, equity: Cash) {
         if !self.orders.requests().is_empty() {
             self.send_all(now, equity);
@@ -318,7 +325,7 @@ impl<'d> Session<'d> {
     }
 
     /// Takes in what became known, and values what is held by it.
-    #[inline]
+    #[inline(always)]
     fn learn(&mut self, arrival: &Arrival, keep: usize) -> Result<(), MoneyError> {
         let Event { time, instrument, kind } = arrival.event;
         let (history, known) = (&self.setup.histories[instrument], &mut self.known[instrument]);
@@ -353,7 +360,7 @@ impl<'d> Session<'d> {
         self.ledger.mark(instrument, price)
     }
 
-    #[inline]
+    #[inline(always)]
     fn account(&mut self, time: Timestamp, equity: Cash) {
         let equity = equity.to_f64();
         self.held.events += 1;
