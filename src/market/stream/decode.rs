@@ -42,9 +42,6 @@ pub(in crate::market) struct Fault {
     explain: Box<Explain>,
 }
 
-/// Says what is wrong with a data row of a table.
-type Explain = dyn Fn(&Table, usize) -> InputError;
-
 impl Fault {
     pub(super) fn new(finding: Finding, explain: impl Fn(&Table, usize) -> InputError + 'static) -> Self {
         Self { finding, explain: Box::new(explain) }
