@@ -28,7 +28,7 @@ pub enum CalendarFault {
     Toml {
         /// Line, from 1.
         line: usize,
-        /// Column, from 1 [characters].
+        /// Column in characters, from 1.
         column: usize,
         /// What the reader of TOML says, with a hint where there is one.
         message: String,

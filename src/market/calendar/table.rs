@@ -65,9 +65,9 @@ pub struct OccasionRow {
     pub nth: Option<i32>,
     /// Day of the week.
     pub weekday: Option<Day>,
-    /// Days after that weekday [days].
+    /// Days after that weekday.
     pub offset: Option<i64>,
-    /// Days after Easter Sunday [days]: -2 is Good Friday.
+    /// Days after Easter Sunday: -2 is Good Friday.
     pub easter: Option<i64>,
     /// Dates one by one.
     #[serde(default, deserialize_with = "dates")]

@@ -3,7 +3,7 @@
 use super::window::Window;
 use super::{Indicator, Period, is_taken};
 
-/// The return over `period` inputs [fraction]: the last over the one `period` before it, less 1 (J. J. Murphy, Technical
+/// The return over `period` inputs (a fraction): the last over the one `period` before it, less 1 (J. J. Murphy, Technical
 /// Analysis of the Financial Markets, 1999, chapter 10). There is none from a price of 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RateOfChange {
