@@ -1,10 +1,8 @@
 //! Instants as a `[strategy]` table writes them.
 
-use chrono::DateTime;
-use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-use crate::sim2real::Timestamp;
+use crate::sim2real::{Timestamp, written_instant};
 
 /// An instant: RFC 3339, as a text or as TOML writes it by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,23 +10,9 @@ pub struct Instant(pub Timestamp);
 
 impl<'de> Deserialize<'de> for Instant {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(untagged)]
-        enum Written {
-            Text(String),
-            Toml(toml::value::Datetime),
-        }
-        let refuse = |found: &str| {
-            D::Error::custom(format!(
-                "{found} is no instant: write one with its zone, as 2024-03-08T09:30:00-05:00 (RFC 3339)"
-            ))
-        };
-        let text = match Written::deserialize(deserializer).map_err(|_| refuse("what is no text"))? {
-            Written::Text(text) => text,
-            Written::Toml(instant) => instant.to_string(),
-        };
-        let instant = DateTime::parse_from_rfc3339(&text).ok().and_then(|t| t.timestamp_nanos_opt());
-        instant.map(|ns| Self(Timestamp(ns))).ok_or_else(|| refuse(&text))
+        let refused =
+            |found: &str| format!("{found} is no instant: write one with its zone, as 2024-03-08T09:30:00-05:00 (RFC 3339)");
+        written_instant(deserializer, refused).map(Self)
     }
 }
 

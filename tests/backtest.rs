@@ -1,65 +1,22 @@
 //! The backtest as its users meet it: where orders fill, what they cost, and that the account adds up.
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
+mod market_scene;
+
 use std::collections::BTreeMap;
 
+use market_scene::{MINUTE, bar, bars, fills, instrument, quotes, settings, venue};
 use proptest::prelude::*;
 use trueup::market::metric::{Costs, Counts, Metrics};
 use trueup::market::{
-    Backtest, Bar, Cash, Execution, History, Instrument, Level, MECHANISMS, Orders, Price, Quantity, Quotes, Reason, Record,
-    Reference, Settings, Side, Status, Strategy, View, check_strategy,
+    Backtest, Bar, Cash, History, Instrument, Orders, Quantity, Quotes, Reason, Record, Reference, Settings, Side, Status,
+    Strategy, View, check_strategy,
 };
-use trueup::sim2real::{Assembly, Seed, Timestamp, Typical};
+use trueup::sim2real::{Seed, Timestamp};
 use trueup::strategies;
-
-const MINUTE: i64 = 60 * Timestamp::NANOS;
 
 fn minute(k: i64) -> Timestamp {
     Timestamp(k * MINUTE)
-}
-
-/// A bar of minute `k`.
-fn bar(k: i64, open: f64, close: f64, volume: f64) -> Bar {
-    let [open, close] = [open, close].map(|p| Price::nearest(p).unwrap());
-    let (high, low) = (open.max(close), open.min(close));
-    Bar { open_at: minute(k), known_at: minute(k + 1), open, high, low, close, volume }
-}
-
-fn bars(prices: &[(f64, f64)]) -> History {
-    let all = prices.iter().enumerate().map(|(k, (open, close))| bar(k as i64, *open, *close, 1_000.0)).collect();
-    History::new(all, Quotes::default()).unwrap()
-}
-
-/// One-level quotes: time [ns], bid and ask; a side at 0 is empty. 100 are displayed on each side.
-fn quotes(rows: &[(i64, f64, f64)]) -> History {
-    let mut quotes = Quotes::with_depth(1);
-    for (time, bid, ask) in rows {
-        let side = |price: f64| if price > 0.0 { vec![Level { price, size: 100.0 }] } else { Vec::new() };
-        quotes.push(Timestamp(*time), &side(*bid), &side(*ask));
-    }
-    History::new(Vec::new(), quotes).unwrap()
-}
-
-/// The execution plant with mechanisms by id, form and value of the only parameter.
-fn venue(parts: &[(&str, &str, f64)]) -> Assembly<Execution> {
-    let mut venue = Assembly::new(Execution, MECHANISMS);
-    for (name, form, value) in parts {
-        let mechanism = *MECHANISMS.iter().find(|m| m.about().name == *name).unwrap();
-        let forms = mechanism.forms(&Typical::default());
-        let index = forms.iter().position(|f| f.name == *form).unwrap();
-        let mut parameters = forms[index].parameters.clone();
-        parameters[0].nominal = *value;
-        venue = venue.with_mechanism(mechanism, index, parameters);
-    }
-    venue
-}
-
-fn instrument(symbol: &str) -> Instrument {
-    Instrument { symbol: symbol.into(), tick_size: 0.01, lot_size: 1.0, average_daily_volume: None, daily_volatility: None }
-}
-
-fn settings() -> Settings {
-    Settings { max_leverage: 10.0, ..Settings::with_cash(Cash::nearest(100_000.0).unwrap()) }
 }
 
 fn run_with(
@@ -108,11 +65,6 @@ impl Strategy for Plan {
         }
         self.events += 1;
     }
-}
-
-/// Time, quantity and price of all fills.
-fn fills(record: &Record) -> Vec<(i64, f64, f64)> {
-    record.blotter.fills.iter().map(|f| (f.filled_at.0, f.quantity.to_f64(), f.price.to_f64())).collect()
 }
 
 const WALK: [(f64, f64); 4] = [(10.0, 11.0), (12.0, 13.0), (14.0, 15.0), (16.0, 17.0)];

@@ -92,13 +92,25 @@ fn honest(diagnosis: &Diagnosis, overflows: bool) -> Result<(), TestCaseError> {
         prop_assert!(effect.parameters.values().all(|p| p.value.is_finite()), "{effect:?}");
     }
     prop_assert!(diagnosis.parameters.values().all(|p| p.value.is_finite()), "{:?}", diagnosis.parameters);
-    prop_assert!(!diagnosis.summary.is_empty() && !diagnosis.summary.contains("NaN"), "{}", diagnosis.summary);
+    prop_assert!(!diagnosis.summary.is_empty() && !["NaN", "inf "].iter().any(|w| diagnosis.summary.contains(w)), "{}", diagnosis.summary);
     let written = serde_json::to_string(diagnosis).unwrap();
     let read = serde_json::from_str::<Diagnosis>(&written);
     if !overflows {
         prop_assert_eq!(read.map(|d| d.verdict).map_err(|e| format!("{e}: {written}")), Ok(diagnosis.verdict));
     }
     Ok(())
+}
+
+/// The random case in which a twin that ran away was told of as an error of NaN.
+#[test]
+fn a_twin_that_runs_away_has_no_error_that_could_be_told() {
+    let twin = Assembly::new(Joint::new(Axis::Rotary, [0.1, 0.2, 2.0, 1.0], [0.2, 0.2, 0.2, 0.1]), MECHANISMS);
+    let samples = Signal::Noise(1.183_994_505_400_809_2, 92_926_148_743_455_256);
+    let fitted = [recording(&Signal::Constant(1e150), &samples, 36, 0.0, true)];
+    let outcome = diagnose(&twin, &fitted, &[], Seed(1), &|_, _, _| ());
+    honest(&outcome.diagnosis, true).unwrap();
+    let fits = &outcome.diagnosis.channels;
+    assert!(fits.iter().all(|f| !f.nominal_rmse.is_nan() && !f.recalibrated_rmse.is_nan() && !f.trued_rmse.is_nan()), "{fits:?}");
 }
 
 proptest! {

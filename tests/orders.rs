@@ -269,3 +269,55 @@ fn orders_for_an_auction_that_the_data_do_not_tell_are_refused() {
     let record = run(quotes(&[(0, 99.0, 101.0), (1, 99.0, 101.0)]), &[], event(0).submit(order));
     assert_eq!(record.blotter.rejected[&Reason::NoAuction], 1);
 }
+
+#[test]
+fn a_reduce_only_order_that_finds_nothing_to_close_says_so() {
+    let order = || Ticket::market(0, Side::Sell, quantity(5.0)).on(Condition::ReduceOnly);
+    for history in [bars(&[(10.0, 10.0); 4]), quotes(&[(0, 99.0, 101.0), (1, 99.0, 101.0)])] {
+        let record = run(history, &[], event(0).submit(order()));
+        assert_eq!((status(&record), record.blotter.orders[0].reason), (vec![Status::Cancelled], Some(Reason::ReduceOnly)));
+    }
+}
+
+#[test]
+fn an_order_that_is_moved_into_the_market_takes_there_and_a_post_only_one_is_refused() {
+    let rows = [(0, 99.0, 101.0), (1, 99.0, 101.0), (2, 99.0, 101.0)];
+    let moved = |condition| {
+        let plan = event(0).submit(limit(Side::Buy, 5.0, 98.0).on(condition)).at(1).replace(1, None, Some(103.0));
+        run(quotes(&rows), &[], plan)
+    };
+    let record = moved(Condition::None);
+    assert_eq!(fills(&record), [(1, 5.0, 101.0)], "at what is asked, not at its limit");
+    assert_eq!(record.blotter.fills[0].why.role, Role::Taker);
+    assert_eq!(status(&moved(Condition::PostOnly)), [Status::Rejected]);
+}
+
+#[test]
+fn what_buyers_took_is_still_there_for_sellers() {
+    let rows = [(0, 99.0, 101.0), (1, 99.0, 101.0)];
+    let at_once = |side, price| limit(side, 80.0, price).working(TimeInForce::ImmediateOrCancel);
+    let plan =
+        event(0).submit(at_once(Side::Buy, 101.0)).submit(at_once(Side::Sell, 99.0)).submit(at_once(Side::Buy, 101.0));
+    assert_eq!(fills(&run(quotes(&rows), &[], plan)), [(0, 80.0, 101.0), (0, 80.0, 99.0), (0, 20.0, 101.0)]);
+}
+
+#[test]
+fn quantities_that_are_changed_count_what_was_filled_and_no_sibling() {
+    // 100 are displayed, which the first takes: 50 are left of the second, and then 30. The first fills the rest.
+    let rows = [(0, 99.0, 101.0), (1, 99.0, 101.0), (2, 97.0, 98.0)];
+    let plan = event(0).group(vec![limit(Side::Buy, 150.0, 101.0), limit(Side::Buy, 150.0, 97.5)]).at(1).replace(
+        2,
+        Some(30.0),
+        None,
+    );
+    let record = run(quotes(&rows), &[], plan);
+    let of = |k: usize| (record.blotter.orders[k].quantity.to_f64(), record.blotter.orders[k].filled.to_f64());
+    assert_eq!((of(0), of(1)), ((150.0, 150.0), (30.0, 0.0)));
+    assert_eq!(record.blotter.orders[1].reason, Some(Reason::Linked));
+}
+
+#[test]
+fn a_message_about_an_order_that_is_over_is_counted() {
+    let plan = event(0).submit(Ticket::market(0, Side::Buy, quantity(1.0))).at(2).cancel(1).replace(1, None, Some(9.0));
+    assert_eq!(run(bars(&[(10.0, 10.0); 4]), &[], plan).blotter.rejected[&Reason::UnknownOrder], 2);
+}

@@ -259,3 +259,35 @@ fn plans_are_quiet_without_orders() {
     let record = run(book(Vec::new()), &[], Plan::default());
     assert_eq!(record.blotter.orders.len(), 0);
 }
+
+/// Ten short over midnight, of which five are bought back 30 s before it; word of that may come after the day was charged.
+#[test]
+fn a_position_is_not_charged_twice_where_word_of_a_fill_comes_late() {
+    let day = 86_400;
+    let rows: Vec<_> = [0, 60, day - 30, day + 10, day + 60].iter().map(|s| (s * Timestamp::NANOS, 100.0, 100.0)).collect();
+    let order = |side, units| Ticket::market(0, side, quantity(units));
+    let plan = event(0).submit(order(Side::Sell, 10.0)).at(2).submit(order(Side::Buy, 5.0));
+    let charged = |response| {
+        let record = run_with(vec![quotes(&rows)], &[("borrow_fee", "", 0.36)], latencies(0.0, 0.0, response), plan.clone());
+        record.ledger.income()[0].charges.total().unwrap().to_f64()
+    };
+    // 0.001 a day of 1,000, and then of 500. What its owner does not know of yet is charged as it was.
+    let expected = |whole: f64, half: f64| 0.001 * (1_000.0 * whole + 500.0 * half) / 86_400.0;
+    let [soon, late] = [charged(0.0), charged(60.0)];
+    assert!((soon - expected(86_370.0, 90.0)).abs() < 1e-8, "{soon}");
+    assert!((late - expected(86_410.0, 50.0)).abs() < 1e-8, "{late}");
+}
+
+#[test]
+fn reports_do_not_overtake_each_other() {
+    let second = Timestamp::NANOS;
+    let rows: Vec<_> = (0..400).map(|k| (k * second, 99.0, 101.0)).collect();
+    let response = Latency::Exponential { least: 0.0, mean: 30.0 };
+    let settings = Settings { latencies: Latencies { response, ..Latencies::default() }, ..settings() };
+    let mut plan = (0..100).fold(event(0), |plan, k| plan.at(k).submit(Ticket::market(0, Side::Buy, quantity(1.0))));
+    let record = run_plan(vec![quotes(&rows)], &[], Settings { max_leverage: 1e3, ..settings }, &mut plan);
+    let ids: Vec<u64> = plan.notices.iter().map(|(_, notice)| notice.order_id.0).collect();
+    assert!(ids.len() > 50 && ids.is_sorted(), "{ids:?}");
+    let filled: Vec<i64> = record.blotter.fills.iter().map(|fill| fill.filled_at.0).collect();
+    assert!(filled.len() == 100 && filled.is_sorted());
+}

@@ -3,58 +3,21 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
-use std::fs;
-use std::path::{Path, PathBuf};
+mod command_scene;
 
-use assert_cmd::Command;
-use serde_json::Value;
-use tempfile::TempDir;
+use std::fs;
+use std::path::Path;
+
+use command_scene::Folder;
 use trueup::io::Table;
 
-struct Scene(TempDir);
-
-impl Scene {
-    /// A folder with the bars of the examples and a run that ends with `sweep`.
-    fn new(sweep: &str) -> Self {
-        let scene = Self(TempDir::new().unwrap());
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join("bars");
-        fs::copy(source.join("bars.parquet"), scene.path("bars.parquet")).unwrap();
-        let run = fs::read_to_string(source.join("run.toml")).unwrap();
-        fs::write(scene.path("run.toml"), format!("{run}\n{sweep}")).unwrap();
-        scene
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn run(&self, arguments: &str) -> (i32, String, String) {
-        let output = Command::new(assert_cmd::cargo::cargo_bin!("trueup"))
-            .current_dir(self.0.path())
-            .args(arguments.split_whitespace())
-            .env_remove("RUST_BACKTRACE")
-            .output()
-            .unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
-    }
-
-    fn json(&self, arguments: &str) -> Value {
-        let (code, out, err) = self.run(&format!("{arguments} --json"));
-        assert_eq!(code, 0, "{err}");
-        serde_json::from_str(&out).unwrap()
-    }
-
-    fn refused(&self, arguments: &str) -> String {
-        let (code, out, err) = self.run(arguments);
-        assert_eq!((code, out.as_str()), (2, ""), "{err}");
-        assert!(err.contains("\n  hint: "), "{err}");
-        err
-    }
-
-    fn bytes(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).unwrap()
-    }
+/// A folder with the bars of the examples and a run that ends with `sweep`.
+fn scene(sweep: &str) -> Folder {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join("bars");
+    let run = fs::read_to_string(source.join("run.toml")).unwrap();
+    let folder = Folder::with(&[("run.toml", &format!("{run}\n{sweep}"))]);
+    fs::copy(source.join("bars.parquet"), folder.path("bars.parquet")).unwrap();
+    folder
 }
 
 const GRID: &str = "
@@ -68,7 +31,7 @@ mechanism.half_spread.bps = { from = 0.5, to = 2.0, log = true, count = 2 }
 
 #[test]
 fn a_grid_is_tried_whole_and_each_run_is_what_a_backtest_of_it_is() {
-    let scene = Scene::new(GRID);
+    let scene = scene(GRID);
     let found = scene.json("sweep run.toml --out s");
     let count = |key: &str| found[key].as_u64().unwrap();
     // 4 x 2 x 2 runs; with slow = 15, fast may be 5 and 10 only.
@@ -97,7 +60,7 @@ fn a_grid_is_tried_whole_and_each_run_is_what_a_backtest_of_it_is() {
 
 #[test]
 fn a_sweep_is_the_same_at_any_number_of_threads_and_when_it_goes_on() {
-    let scene = Scene::new(GRID);
+    let scene = scene(GRID);
     let first = scene.run("sweep run.toml --out a --threads 1");
     assert_eq!((first.0, scene.run("sweep run.toml --out b --threads 3").0), (0, 0), "{}", first.2);
     for name in ["sweep.parquet", "sweep.json", "report.html"] {
@@ -135,7 +98,7 @@ fn draws_do_not_depend_on_how_many_there_are() {
         )
     };
     let column = |runs: usize, name: &str| {
-        let scene = Scene::new(&random(runs));
+        let scene = scene(&random(runs));
         assert_eq!(scene.run("sweep run.toml --out s").0, 0);
         Table::read(scene.path("s/sweep.parquet")).unwrap().floats(name).unwrap()
     };
@@ -149,7 +112,7 @@ fn draws_do_not_depend_on_how_many_there_are() {
 
 #[test]
 fn kinds_of_strategies_keep_their_own_parameters() {
-    let scene = Scene::new(
+    let scene = scene(
         "[sweep]\nmetric = 'total_return'\n[sweep.ranges]\n'strategy.kind' = ['sma_cross', 'buy_and_hold']\n'strategy.fast' = [5, 10]\n'strategy.weight' = [0.5, 0.9]\n",
     );
     let found = scene.json("sweep run.toml --out s");
@@ -159,7 +122,7 @@ fn kinds_of_strategies_keep_their_own_parameters() {
 
 #[test]
 fn a_backtest_has_no_use_for_the_section() {
-    let (with, without) = (Scene::new(GRID), Scene::new(""));
+    let (with, without) = (scene(GRID), scene(""));
     assert_eq!(with.json("backtest run.toml")["metrics"], without.json("backtest run.toml")["metrics"]);
 }
 
@@ -187,17 +150,17 @@ fn what_cannot_be_swept_over_is_said_with_place_and_remedy() {
         ("runs = 5", "'strategy.fast' = [1, 2]"),
         ("metric = 'total_return'", ""),
     ] {
-        let scene = Scene::new(&format!("[sweep]\n{metric}\n[sweep.ranges]\n{ranges}\n"));
+        let scene = scene(&format!("[sweep]\n{metric}\n[sweep.ranges]\n{ranges}\n"));
         said += &format!("{metric}, {ranges}\n{}\n", scene.refused("sweep run.toml --out s"));
         assert!(!scene.path("s").exists(), "something was written");
     }
-    said += &Scene::new("").refused("sweep run.toml");
+    said += &scene("").refused("sweep run.toml");
     insta::assert_snapshot!("refused", said);
 }
 
 #[test]
 fn the_table_and_the_help_are_as_they_are() {
-    let scene = Scene::new(GRID);
+    let scene = scene(GRID);
     let (code, out, err) = scene.run("sweep run.toml");
     assert_eq!((code, err.as_str()), (0, ""));
     insta::assert_snapshot!("told", out);

@@ -3,13 +3,13 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+mod command_scene;
+
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
 
-use assert_cmd::Command;
+use command_scene::Folder;
 use serde_json::Value;
-use tempfile::TempDir;
 use trueup::io::Table;
 
 const HOUR: i64 = 3_600_000_000_000;
@@ -71,36 +71,8 @@ purge = '1d'
 embargo = '12h'
 ";
 
-struct Scene(TempDir);
-
-impl Scene {
-    fn new(sweep: &str, changed: Option<i64>) -> Self {
-        let scene = Self(TempDir::new().unwrap());
-        fs::write(scene.path("bars.csv"), bars(changed)).unwrap();
-        fs::write(scene.path("run.toml"), format!("{RUN}{sweep}")).unwrap();
-        scene
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn run(&self, arguments: &str) -> (i32, String, String) {
-        let output = Command::new(assert_cmd::cargo::cargo_bin!("trueup"))
-            .current_dir(self.0.path())
-            .args(arguments.split_whitespace())
-            .env_remove("RUST_BACKTRACE")
-            .output()
-            .unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
-    }
-
-    fn json(&self, arguments: &str) -> Value {
-        let (code, out, err) = self.run(&format!("{arguments} --json"));
-        assert_eq!(code, 0, "{err}");
-        serde_json::from_str(&out).unwrap()
-    }
+fn scene(sweep: &str, changed: Option<i64>) -> Folder {
+    Folder::with(&[("bars.csv", &bars(changed)), ("run.toml", &format!("{RUN}{sweep}"))])
 }
 
 fn windows(found: &Value) -> &Vec<Value> {
@@ -109,14 +81,14 @@ fn windows(found: &Value) -> &Vec<Value> {
 
 #[test]
 fn no_choice_knows_its_test() {
-    let as_it_is = Scene::new(SWEEP, None).json("walk-forward run.toml");
+    let as_it_is = scene(SWEEP, None).json("walk-forward run.toml");
     let starts: Vec<i64> = windows(&as_it_is).iter().map(|w| w["test_start"].as_i64().unwrap()).collect();
     assert_eq!(starts, [17 * DAY + 13 * HOUR, 23 * DAY + 13 * HOUR, 29 * DAY + 13 * HOUR, 35 * DAY + 13 * HOUR]);
     for (k, start) in starts.iter().enumerate() {
         let end = windows(&as_it_is)[k]["train_end"].as_i64().unwrap();
         assert_eq!(start - end, 36 * HOUR, "purge and embargo");
         // What is known from the end of the training on is another walk: all that goes into the choices before stays.
-        let other = Scene::new(SWEEP, Some(end / HOUR)).json("walk-forward run.toml");
+        let other = scene(SWEEP, Some(end / HOUR)).json("walk-forward run.toml");
         for (now, then) in windows(&other).iter().zip(windows(&as_it_is)).take(k + 1) {
             assert_eq!(now["chosen"], then["chosen"], "window {k}");
         }
@@ -129,7 +101,7 @@ fn no_choice_knows_its_test() {
 
 #[test]
 fn a_choice_is_the_best_of_a_sweep_of_its_training() {
-    let scene = Scene::new(SWEEP, None);
+    let scene = scene(SWEEP, None);
     let found = scene.json("walk-forward run.toml");
     let window = &windows(&found)[1];
     // Bars known from start on, and before end.
@@ -146,7 +118,7 @@ fn a_choice_is_the_best_of_a_sweep_of_its_training() {
 
 #[test]
 fn tests_in_a_row_are_one_account_that_begins_flat() {
-    let scene = Scene::new(SWEEP, None);
+    let scene = scene(SWEEP, None);
     let found = scene.json("walk-forward run.toml --out w");
     let mut cash = 1e6;
     for window in windows(&found) {
@@ -174,7 +146,7 @@ fn a_test_is_a_backtest_of_its_time() {
     let hold = |text: &str| {
         text.replace("kind = 'sma_cross'\nfast = 3\nslow = 30\nshort = true", "kind = 'buy_and_hold'\nweight = 0.5")
     };
-    let scene = Scene::new(sweep, None);
+    let scene = scene(sweep, None);
     fs::write(scene.path("run.toml"), hold(&format!("{RUN}{sweep}"))).unwrap();
     let found = scene.json("walk-forward run.toml");
     let between = "cash = 1_000_000\nstart = '1970-01-17T01:00:00Z'\nend = '1970-01-27T01:00:00Z'";
@@ -187,7 +159,7 @@ fn a_test_is_a_backtest_of_its_time() {
 
 #[test]
 fn a_walk_is_the_same_at_any_number_of_threads_and_is_told_in_a_table() {
-    let scene = Scene::new(SWEEP, None);
+    let scene = scene(SWEEP, None);
     assert_eq!(scene.json("walk-forward run.toml --threads 1"), scene.json("walk-forward run.toml --threads 3"));
     let (code, out, err) = scene.run("walk-forward run.toml");
     assert_eq!((code, err.as_str()), (0, ""));
@@ -207,7 +179,7 @@ fn what_cannot_be_walked_is_said_with_place_and_remedy() {
         ("[sweep.walk_forward]\ntrain = '16d'\ntest = '6d'\npurge = '1d'\nembargo = '12h'\n", ""),
     ] {
         assert!(SWEEP.contains(from));
-        let scene = Scene::new(&SWEEP.replace(from, to), None);
+        let scene = scene(&SWEEP.replace(from, to), None);
         let (code, out, err) = scene.run("walk-forward run.toml --out w");
         assert_eq!((code, out.as_str()), (2, ""), "{err}");
         assert!(err.contains("\n  hint: ") && !scene.path("w").exists(), "{err}");

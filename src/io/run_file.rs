@@ -5,9 +5,8 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-use chrono::DateTime;
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{DeserializeOwned, DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
+use serde::de::{DeserializeOwned, DeserializeSeed, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use super::data_table::{DataTable, data_entry};
@@ -18,7 +17,7 @@ use super::instrument_entry::{InstrumentEntry, check_instruments};
 use super::quantity::{MechanismEntry, check_mechanisms};
 use super::sweep_section::{SweepSection, SweepTable};
 use super::twin_file::AssumedPrice;
-use crate::sim2real::Timestamp;
+use crate::sim2real::{Timestamp, written_instant};
 
 /// A run, as its document declares it.
 #[derive(Debug, Clone, PartialEq)]
@@ -233,25 +232,13 @@ impl RunFile {
     }
 }
 
-/// Reads an instant: RFC 3339, as a text or as TOML writes it by itself.
+/// Reads an instant that need not be there.
 fn instant<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Timestamp>, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum Written {
-        Text(String),
-        Toml(toml::value::Datetime),
-    }
-    let refuse = |found: &str| {
-        D::Error::custom(format!(
-            "invalid value: {found:?}, expected an instant{HINT}such as \"2024-03-08T14:30:00Z\" (RFC 3339)"
-        ))
+    let refused = |found: &str| {
+        let hint = "such as \"2024-03-08T14:30:00Z\" (RFC 3339)";
+        format!("invalid value: {found:?}, expected an instant{HINT}{hint}")
     };
-    let text = match Written::deserialize(deserializer).map_err(|_| refuse("no text"))? {
-        Written::Text(text) => text,
-        Written::Toml(instant) => instant.to_string(),
-    };
-    let instant = DateTime::parse_from_rfc3339(&text).ok().and_then(|t| t.timestamp_nanos_opt());
-    instant.map(|ns| Some(Timestamp(ns))).ok_or_else(|| refuse(&text))
+    written_instant(deserializer, refused).map(Some)
 }
 
 #[derive(Deserialize)]

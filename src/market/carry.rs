@@ -44,9 +44,14 @@ impl Session<'_> {
         if !self.venue.charges {
             return Ok(());
         }
-        let since = std::mem::replace(&mut self.carry.since[instrument], now);
+        // Word of a fill may come after the day it belongs to was charged.
+        let since = self.carry.since[instrument];
+        if now <= since {
+            return Ok(());
+        }
+        self.carry.since[instrument] = now;
         let position = self.ledger.positions()[instrument];
-        let Some(mark) = position.mark.filter(|_| position.quantity != Quantity::ZERO && since < now) else { return Ok(()) };
+        let Some(mark) = position.mark.filter(|_| position.quantity != Quantity::ZERO) else { return Ok(()) };
         let side = if position.quantity > Quantity::ZERO { Side::Buy } else { Side::Sell };
         let mid = mark.to_f64();
         let held = InFlight::market(side, position.quantity.abs().to_f64(), since, mid, mid).as_a(Role::Holder);

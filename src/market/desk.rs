@@ -1,26 +1,18 @@
-//! The desk: it checks what a strategy asks for, sends it, and books what becomes of it.
+//! The desk: it checks what a strategy asks for, and sends it.
 
 use crate::sim2real::Timestamp;
 
 use super::agenda::{Due, Phase};
 use super::backtest::BacktestError;
 use super::session::Session;
-use super::venue::{Filled, Outcome, Resting, What};
+use super::venue::{Outcome, Resting, What};
 use super::{
-    Cash, Condition, Fill, FillCost, InFlight, Link, News, Notice, OpenOrder, Order, OrderId, OrderKind, Price, Quantity,
-    Reason, Rejection, Request, Role, Status, Ticket, TimeInForce, Trade, Why,
+    Cash, Condition, InFlight, Link, OpenOrder, Order, OrderId, OrderKind, Price, Quantity, Reason, Rejection, Request,
+    Role, Side, Status, Ticket, TimeInForce,
 };
 
 /// Length of a day of UTC [ns].
 const DAY: i64 = 86_400 * Timestamp::NANOS;
-
-/// What became of an order, until it is known.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pending {
-    outcome: Outcome,
-    /// First of its terms, among those of all fills under way.
-    terms: usize,
-}
 
 impl Session<'_> {
     /// Sends what the strategy asked for, or refuses it.
@@ -121,16 +113,15 @@ impl Session<'_> {
             average_daily_volume: about.average_daily_volume.or_else(|| daily.volume()),
             daily_volatility: about.daily_volatility.or_else(|| daily.volatility()),
         };
-        let shaped = self.venue.floors[instrument].accept(&decided);
+        // Laws of commands say when it arrives and how much of a volume it may be; its quantity is its owner's.
+        let shaped = self.venue.floors[instrument].shape(&decided);
         let order = shaped.arriving(self.clocks.order(shaped.arrives_at));
-        // A law may have cut the quantity down: the rest is not sent.
-        let left = self.lots_of(instrument, order.quantity, quantity);
         let child = matches!(link, Link::ChildOf { .. });
-        let resting = Resting::new(id, ticket, order, left);
+        let resting = Resting::new(id, ticket, order, quantity);
         let known = &mut self.known[instrument];
         let quote = known.quotes.newest(1).last();
         let (seen_bid, seen_ask) = match &known.book {
-            Some(book) => [super::Side::Buy, super::Side::Sell].map(|side| book.best(side).map(Price::to_f64)).into(),
+            Some(book) => [Side::Buy, Side::Sell].map(|side| book.best(side).map(Price::to_f64)).into(),
             None => (quote.and_then(|quote| quote.bid()), quote.and_then(|quote| quote.ask())),
         };
         known.opened(OpenOrder { id, side, kind, left: quantity, closes: child || condition == Condition::ReduceOnly });
@@ -164,19 +155,10 @@ impl Session<'_> {
         }
     }
 
-    /// A model's quantity in whole lots; what is whole stays whole.
-    fn lots_of(&self, instrument: usize, model: f64, whole: Quantity) -> Quantity {
-        if model >= whole.to_f64() {
-            return whole;
-        }
-        let increments = self.setup.increments[instrument];
-        Quantity::nearest(model.max(0.0)).map_or(whole, |quantity| increments.whole_lots(quantity))
-    }
-
     /// Sends a message about an order.
     fn post(&mut self, id: OrderId, now: Timestamp, due: Due) {
         if self.blotter.place(id).is_none() {
-            *self.blotter.rejected.entry(Reason::UnknownOrder).or_default() += 1;
+            self.refuse(Reason::UnknownOrder);
             return;
         }
         let at = self.clocks.order(now);
@@ -212,7 +194,7 @@ impl Session<'_> {
         };
         let ids: Vec<OrderId> = self.sent.values().filter(|(_, other)| together(other)).map(|(_, other)| other.id).collect();
         let orders: Vec<Resting> = ids.iter().filter_map(|id| self.sent.remove(id)).map(|(_, order)| order).collect();
-        let orders = orders.into_iter().map(|order| Resting { order: order.order.arriving(at), ..order }).collect();
+        let orders = orders.into_iter().map(|order| order.arriving(at)).collect();
         self.venue.floors[instrument].arrive(orders, at);
         self.expect_open(instrument);
         Some(instrument)
@@ -232,7 +214,17 @@ impl Session<'_> {
             return None;
         }
         let instrument = self.blotter.orders.get(self.blotter.place(id)?)?.instrument;
-        self.venue.floors[instrument].cancel(id, at, reason).then_some(instrument)
+        let there = self.venue.floors[instrument].cancel(id, at, reason);
+        // A time that ends for an order that is over already is nobody's mistake.
+        if !there && reason == Reason::Asked {
+            self.refuse(Reason::UnknownOrder);
+        }
+        there.then_some(instrument)
+    }
+
+    /// Counts a message about an order that could not be obeyed.
+    fn refuse(&mut self, reason: Reason) {
+        *self.blotter.rejected.entry(reason).or_default() += 1;
     }
 
     fn amend(&mut self, id: OrderId, quantity: Option<Quantity>, price: Option<Price>, at: Timestamp) -> Option<usize> {
@@ -241,140 +233,14 @@ impl Session<'_> {
         let fits = quantity.is_none_or(|q| q >= Quantity::ZERO && increments.holds(q))
             && price.is_none_or(|p| p.0 > 0 && increments.on_tick(p));
         if !fits {
-            *self.blotter.rejected.entry(Reason::OffTick).or_default() += 1;
+            self.refuse(Reason::OffTick);
             return None;
         }
-        self.venue.floors[instrument].replace(id, quantity, price, at).then_some(instrument)
-    }
-
-    /// Takes what happened on a floor, which its owner will know in a while.
-    pub(super) fn settle(&mut self, instrument: usize) -> Result<(), BacktestError> {
-        if self.venue.floors[instrument].is_quiet() {
-            return Ok(());
+        let there = self.venue.floors[instrument].replace(id, quantity, price, at);
+        if !there {
+            self.refuse(Reason::UnknownOrder);
         }
-        let (mut outcomes, mut terms) = (std::mem::take(&mut self.outcomes), std::mem::take(&mut self.terms));
-        self.venue.floors[instrument].drain(&mut outcomes, &mut terms);
-        let count = self.venue.conceding.len();
-        let mut fills = 0;
-        for outcome in &outcomes {
-            let mut own: &[f64] = &[];
-            if let What::Filled(filled) = outcome.what {
-                self.check_price(outcome, &filled)?;
-                own = &terms[fills * count..(fills + 1) * count];
-                fills += 1;
-            }
-            self.pend(*outcome, own);
-        }
-        outcomes.clear();
-        terms.clear();
-        (self.outcomes, self.terms) = (outcomes, terms);
-        Ok(())
-    }
-
-    fn check_price(&self, outcome: &Outcome, filled: &Filled) -> Result<(), BacktestError> {
-        if filled.price.0 > 0 && filled.model_price.is_finite() {
-            return Ok(());
-        }
-        let symbol = self.setup.instruments[outcome.instrument].symbol.clone();
-        Err(BacktestError::ModelPrice { order_id: outcome.id.0, symbol, time: outcome.at, price: filled.model_price })
-    }
-
-    /// Sends word of what became of an order.
-    fn pend(&mut self, outcome: Outcome, terms: &[f64]) {
-        let at = self.clocks.response(outcome.at);
-        let pending = Pending { outcome, terms: self.pending_terms.len() };
-        self.pending_terms.extend_from_slice(terms);
-        self.pending.push(Some(pending));
-        self.agenda.put(at, Phase::Notices, Due::Notice(self.pending.len() - 1));
-        self.under_way += 1;
-    }
-
-    /// What became of an order is known: it is booked.
-    pub(super) fn note(&mut self, place: usize) -> Result<Option<Notice>, BacktestError> {
-        let Some(Pending { outcome, terms }) = self.pending.get_mut(place).and_then(Option::take) else { return Ok(None) };
-        let count = self.venue.conceding.len();
-        let Outcome { id, instrument, at, what } = outcome;
-        let Some(k) = self.blotter.place(id) else { return Ok(None) };
-        let news = match what {
-            What::Filled(filled) => {
-                self.charge_held(instrument, at)?;
-                self.book(k, &outcome, &filled)?;
-                let own: Vec<f64> = self.pending_terms[terms..terms + count].to_vec();
-                for (mechanism, term) in self.venue.conceding.iter().zip(&own) {
-                    *self.blotter.concessions.entry(mechanism).or_default() += term * filled.quantity.to_f64();
-                }
-                self.blotter.terms.extend(own);
-                let order = &self.blotter.orders[k];
-                let left = order.quantity - order.filled;
-                News::Filled { quantity: filled.quantity, price: filled.price, role: filled.role, left }
-            }
-            What::Ended(reason) => {
-                let order = &mut self.blotter.orders[k];
-                (order.status, order.reason) = (Status::ended(reason), Some(reason));
-                self.known[instrument].closed(id);
-                News::Ended(reason)
-            }
-            What::SetOff => News::SetOff,
-            What::Replaced { quantity, kind } => {
-                let order = &mut self.blotter.orders[k];
-                (order.quantity, order.kind) = (quantity, kind);
-                let left = quantity - order.filled;
-                self.known[instrument].changed(id, left, kind);
-                News::Replaced
-            }
-        };
-        self.under_way -= 1;
-        if self.under_way == 0 {
-            self.pending.clear();
-            self.pending_terms.clear();
-        }
-        let side = self.blotter.orders[k].side;
-        Ok(Some(Notice { order_id: id, instrument, side, at, news }))
-    }
-
-    /// Books a fill of order `k`.
-    fn book(&mut self, k: usize, outcome: &Outcome, filled: &Filled) -> Result<(), BacktestError> {
-        let Outcome { id, instrument, at, .. } = *outcome;
-        let order = &mut self.blotter.orders[k];
-        let symbol = &self.setup.instruments[instrument].symbol;
-        let money = |error| BacktestError::Money { place: format!("order {} for {symbol} at {at}", id.0), error };
-        let (side, quantity, price) = (order.side, filled.quantity, filled.price);
-        let fee = Cash::nearest(filled.fee).map_err(money)?;
-        let closes = self.ledger.positions()[instrument].quantity.signed(side) < Quantity::ZERO;
-        let realised = self.ledger.book(&Trade { instrument, side, price, quantity, fee }).map_err(money)?;
-        order.filled = order.filled + quantity;
-        if order.filled >= order.quantity {
-            (order.status, order.reason) = (Status::Filled, None);
-        }
-        let loss = |from: f64, to: f64| side.sign() * (to - from) * quantity.to_f64();
-        let cost = FillCost {
-            timing: loss(order.decision_price.to_f64(), filled.mid),
-            spread_and_impact: loss(filled.mid, filled.model_price),
-            rounding: loss(filled.model_price, price.to_f64()),
-        };
-        self.known[instrument].less(id, quantity);
-        let why = Why {
-            role: filled.role,
-            data: self.data_of[instrument],
-            row: filled.row,
-            met: filled.mid,
-            band: filled.band,
-            queued_behind: filled.queued_behind,
-        };
-        self.blotter.fills.push(Fill {
-            fill_id: self.blotter.fills.len() as u64 + 1,
-            order_id: id.0,
-            instrument,
-            filled_at: at,
-            side,
-            quantity,
-            price,
-            fee,
-            realised: closes.then_some(realised),
-            cost,
-            why,
-        });
-        Ok(())
+        there.then_some(instrument)
     }
 }
 

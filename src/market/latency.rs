@@ -215,6 +215,8 @@ pub(super) struct Clocks {
     response: ChaCha8Rng,
     compute: ChaCha8Rng,
     strain: Watch,
+    /// When the last order, and the last report, arrives: on one line nothing overtakes.
+    last: [Timestamp; 2],
 }
 
 /// What is watched to know how strained the market is.
@@ -236,6 +238,7 @@ impl Clocks {
             response: stream("latency.response"),
             compute: stream("latency.compute"),
             strain: Watch::default(),
+            last: [Timestamp::MIN; 2],
         }
     }
 
@@ -270,17 +273,19 @@ impl Clocks {
         later(time, seconds)
     }
 
-    /// An order that is decided at `time` leaves, and arrives if nothing else delays it: how long that takes [ns].
+    /// When an order that leaves at `time`, or is delayed to it, arrives.
     pub fn order(&mut self, time: Timestamp) -> Timestamp {
         let thought = self.latencies.compute.draw(&mut self.compute);
         let travelled = self.longer() * self.latencies.order.draw(&mut self.order);
-        later(time, thought + travelled)
+        self.last[0] = later(time, thought + travelled).max(self.last[0]);
+        self.last[0]
     }
 
     /// What happened at `time` is known to the strategy.
     pub fn response(&mut self, time: Timestamp) -> Timestamp {
         let seconds = self.longer() * self.latencies.response.draw(&mut self.response);
-        later(time, seconds)
+        self.last[1] = later(time, seconds).max(self.last[1]);
+        self.last[1]
     }
 }
 

@@ -6,6 +6,7 @@ mod backtest;
 mod bar;
 mod blotter;
 mod book;
+mod booking;
 mod calendar;
 mod carry;
 mod check;
@@ -28,6 +29,7 @@ mod ledger;
 mod log_entry;
 #[cfg(feature = "io")]
 mod log_folder;
+mod mail;
 pub mod mechanism;
 pub mod metric;
 mod money;

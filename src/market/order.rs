@@ -2,6 +2,8 @@
 
 use crate::sim2real::{Command, DelayLine, Tick, Timestamp};
 
+use super::Price;
+
 /// Which way an order trades.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Side {
@@ -33,6 +35,15 @@ impl Side {
         match self {
             Self::Buy => Self::Sell,
             Self::Sell => Self::Buy,
+        }
+    }
+
+    /// Whether an order of this side with the limit `limit` may trade at `price`.
+    #[must_use]
+    pub fn accepts(self, price: Price, limit: Price) -> bool {
+        match self {
+            Self::Buy => price <= limit,
+            Self::Sell => price >= limit,
         }
     }
 

@@ -149,8 +149,8 @@ fn matched(summary: &RunSummary, backtest: &Backtest) -> Vec<(&'static str, Stri
         if by_bars {
             let count = match summary.counts.ambiguous_bars {
                 0 => "in no bar did it decide what was filled".to_owned(),
-                1 => "in 1 bar orders waited on both sides of the open, and it decided".to_owned(),
-                n => format!("in {n} bars orders waited on both sides of the open, and it decided"),
+                1 => "in 1 bar orders waited on both sides of the open, and it may have decided".to_owned(),
+                n => format!("in {n} bars orders waited on both sides of the open, and it may have decided"),
             };
             all.push(("way within a bar", format!("{}; {count}", matching.intrabar.word())));
             all.push(("limit orders", format!("filled {}, at the limit", matching.limit_fill.word())));

@@ -9,9 +9,9 @@ use super::agenda::{Agenda, Due, Phase};
 use super::backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 use super::blotter::Blotter;
 use super::carry::Carry;
-use super::desk::Pending;
 use super::known::Known;
 use super::latency::Clocks;
+use super::mail::Mail;
 use super::transit::Transit;
 use super::venue::{Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{
@@ -35,10 +35,8 @@ pub struct Session<'d> {
     pub(super) data_of: Vec<EventKind>,
     /// Orders on their way to the venue.
     pub(super) sent: BTreeMap<OrderId, (usize, Resting)>,
-    /// What became of orders and is not known yet; how many of them; and what mechanisms added to the fills among them.
-    pub(super) pending: Vec<Option<Pending>>,
-    pub(super) under_way: usize,
-    pub(super) pending_terms: Vec<f64>,
+    /// What became of orders and is not known yet.
+    pub(super) mail: Mail,
     pub(super) outcomes: Vec<Outcome>,
     pub(super) terms: Vec<f64>,
     /// The bar of each instrument whose open is on the agenda.
@@ -99,6 +97,7 @@ impl<'d> Session<'d> {
             seed,
         };
         let venue = Venue::new(&setup.venue, &venue);
+        let conceding = venue.conceding.len();
         let count = setup.instruments.len();
         Self {
             setup,
@@ -114,9 +113,7 @@ impl<'d> Session<'d> {
             venue,
             data_of,
             sent: BTreeMap::new(),
-            pending: Vec::new(),
-            under_way: 0,
-            pending_terms: Vec::new(),
+            mail: Mail::new(conceding),
             outcomes: Vec::new(),
             terms: Vec::new(),
             expected: vec![None; count],
@@ -177,7 +174,7 @@ impl<'d> Session<'d> {
     pub fn finish(mut self) -> Result<Record, BacktestError> {
         let end = self.equity.last().map_or(Timestamp::MIN, |point| point.time);
         let fills = self.blotter.fills.len();
-        while self.agenda.peek().is_some_and(|(at, _)| at <= end) || self.under_way > 0 {
+        while self.agenda.peek().is_some_and(|(at, _)| at <= end) || !self.mail.is_empty() {
             let Some((at, due)) = self.agenda.pop() else { break };
             match due {
                 Due::Notice(place) => drop(self.note(place)?),

@@ -17,12 +17,13 @@ mod path;
 mod queue;
 mod resting;
 mod shown;
+mod taken;
 
 use serde::{Deserialize, Serialize};
 
 use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
 
-use super::{Book, DepthBook, Execution, InFlight, Increments, Quantity, Side};
+use super::{Book, DepthBook, Execution, Increments, Quantity, Side};
 
 pub use path::Intrabar;
 pub use queue::QueueModel;
@@ -174,11 +175,6 @@ impl Floor {
     /// How far bars left open what was filled.
     pub fn ambiguous_bars(&self) -> usize {
         self.ambiguous
-    }
-
-    /// Shapes an order as command laws do, with room for what it may become.
-    pub fn accept(&mut self, order: &InFlight) -> InFlight {
-        self.shape(order)
     }
 
     /// Takes what happened since the last time, with what mechanisms added to each fill.

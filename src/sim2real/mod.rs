@@ -32,4 +32,4 @@ pub use residual::ChannelWeight;
 pub use run::Run;
 pub use seed::Seed;
 pub use simulator::{Candidate, Simulator, Twin};
-pub use time::{Tick, Timestamp};
+pub use time::{Tick, Timestamp, written_instant};

@@ -3,7 +3,9 @@
 use std::fmt;
 use std::ops::{Add, Sub};
 
-use serde::{Deserialize, Serialize};
+use chrono::DateTime;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// One step of a run: the interval `[time, time + step)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +65,30 @@ impl fmt::Display for Timestamp {
         let instant = chrono::DateTime::from_timestamp_nanos(self.0);
         f.write_str(&instant.to_rfc3339_opts(chrono::SecondsFormat::AutoSi, true))
     }
+}
+
+/// Reads an instant as documents write it: RFC 3339, as a text or as TOML writes it by itself. `refused` says what is wrong
+/// with what was found instead.
+///
+/// # Errors
+/// What is no text, or none of an instant with its zone.
+pub fn written_instant<'de, D: Deserializer<'de>>(
+    deserializer: D,
+    refused: impl Fn(&str) -> String,
+) -> Result<Timestamp, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Written {
+        Text(String),
+        Toml(toml::value::Datetime),
+    }
+    let refuse = |found: &str| D::Error::custom(refused(found));
+    let text = match Written::deserialize(deserializer).map_err(|_| refuse("what is no text"))? {
+        Written::Text(text) => text,
+        Written::Toml(instant) => instant.to_string(),
+    };
+    let instant = DateTime::parse_from_rfc3339(&text).ok().and_then(|t| t.timestamp_nanos_opt());
+    instant.map(Timestamp).ok_or_else(|| refuse(&text))
 }
 
 #[cfg(test)]

@@ -97,7 +97,7 @@ enum Step {
 }
 
 /// Does what it is told at given events, and remembers what it learned.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Plan {
     steps: BTreeMap<usize, Vec<Step>>,
     next: usize,

@@ -4,22 +4,23 @@ use crate::market::{Bar, Book, Condition, OrderKind, Price, Quantity, Reason, Si
 use crate::sim2real::Timestamp;
 
 use super::floor::{Floor, Offer};
+use super::taken::Taken;
 use super::{LimitFill, Resting};
 
 impl Floor {
     /// Whether an order waits that a bar opening at `open_at` may fill.
     pub fn awaits_open(&self, open_at: Timestamp) -> bool {
-        self.resting.iter().any(|order| order.order.arrives_at <= open_at)
+        self.resting.iter().any(|order| order.from <= open_at)
     }
 
     /// The bar opens: orders that arrived by then meet its open, the first price after their decision.
     pub fn on_open(&mut self, bar: &Bar, first_of_session: bool) {
-        self.taken = 0.0;
+        self.taken = Taken::of_bars();
         let at = bar.open_at;
         let offer = self.offer(bar, at, bar.open);
         for k in 0..self.resting.len() {
             let order = &mut self.resting[k];
-            if order.order.arrives_at > at || order.tradable() <= Quantity::ZERO {
+            if order.from > at || order.tradable() <= Quantity::ZERO {
                 continue;
             }
             order.follow(bar.open);
@@ -60,7 +61,7 @@ impl Floor {
             (_, TimeInForce::FillOrKill) => Some(Reason::FillOrKill),
             (_, TimeInForce::ImmediateOrCancel) => Some(Reason::TimeInForce),
             // A market order takes once; what the volume does not allow is cancelled.
-            (OrderKind::Market, _) if takes && !order.waits_for_parent() => Some(Reason::NoVolume),
+            (OrderKind::Market, _) if takes && !order.waits_for_parent() => Some(order.exhausted()),
             (OrderKind::MarketOnOpen | OrderKind::LimitOnOpen { .. }, _) if first_of_session => Some(Reason::TimeInForce),
             _ => None,
         };
@@ -75,7 +76,7 @@ impl Floor {
         if cap.is_infinite() {
             return self.allowed(k);
         }
-        let left = (cap * offer.volume - self.taken).max(0.0);
+        let left = (cap * offer.volume - self.taken.by(self.resting[k].side)).max(0.0);
         Quantity::nearest(left.min(9e9)).map_or(Quantity::ZERO, |q| self.increments.whole_lots(q)).min(self.allowed(k))
     }
 
@@ -85,7 +86,7 @@ impl Floor {
     /// is filled carries the time at which the bar could be known, the latest it can have been.
     pub fn on_bar(&mut self, bar: &Bar, last_of_session: bool) {
         let at = bar.known_at;
-        if !self.resting.iter().any(|order| order.order.arrives_at <= bar.open_at) {
+        if !self.resting.iter().any(|order| order.from <= bar.open_at) {
             return;
         }
         let way = self.way(bar);
@@ -102,7 +103,7 @@ impl Floor {
     fn way(&mut self, bar: &Bar) -> [Price; 4] {
         let mut entry = [false; 2];
         let (mut above, mut below) = (false, false);
-        for order in self.resting.iter().filter(|o| o.order.arrives_at <= bar.open_at) {
+        for order in self.resting.iter().filter(|o| o.from <= bar.open_at) {
             entry[usize::from(order.side == Side::Sell)] |= order.tradable() > Quantity::ZERO;
             for price in [order.limit(), order.trigger()].into_iter().flatten() {
                 above |= price > bar.open && price <= bar.high;
@@ -146,17 +147,18 @@ impl Floor {
                 _ => {
                     let room = self.room(k, &offer);
                     self.make(k, &offer, room);
-                    self.taken += (before.0 - self.resting[k].left).to_f64();
+                    let (side, left) = (self.resting[k].side, self.resting[k].left);
+                    self.taken.add(side, (before.0 - left).to_f64());
                     self.resting[k].met = true;
                 }
             }
             if (self.resting[k].left, self.resting[k].kind) == before {
-                // The cap has been used up: it waits for the next bar.
-                self.resting[k].order.arrives_at = self.resting[k].order.arrives_at.max(bar.open_at + 1);
+                // The cap has been used up, or there is nothing to close: it waits for the next bar.
+                self.resting[k].from = bar.open_at + 1;
             }
         }
         for order in &mut self.resting {
-            if order.order.arrives_at <= bar.open_at {
+            if order.from <= bar.open_at {
                 order.follow(to);
             }
         }
@@ -165,7 +167,7 @@ impl Floor {
     /// The first order that the way from `from` to `to` fills or sets off, and the price at which it does.
     fn next_passed(&self, bar: &Bar, from: Price, to: Price) -> Option<(usize, Price)> {
         let passes = |order: &Resting| {
-            if order.order.arrives_at > bar.open_at || order.tradable() <= Quantity::ZERO {
+            if order.from > bar.open_at || order.tradable() <= Quantity::ZERO {
                 return None;
             }
             let (price, far) = match order.kind {
@@ -205,7 +207,7 @@ impl Floor {
         for k in 0..self.resting.len() {
             let order = self.resting[k];
             let on_close = matches!(order.kind, OrderKind::MarketOnClose | OrderKind::LimitOnClose { .. });
-            if !on_close || order.order.arrives_at > bar.open_at {
+            if !on_close || order.from > bar.open_at {
                 continue;
             }
             if order.accepts(bar.close) {

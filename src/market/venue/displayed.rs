@@ -8,6 +8,7 @@ use crate::sim2real::Timestamp;
 use super::floor::{Floor, Offer};
 use super::queue::Place;
 use super::shown::Shown;
+use super::taken::Taken;
 use super::{LimitFill, Resting, What};
 
 impl Floor {
@@ -49,7 +50,8 @@ impl Floor {
                 && let Some(offer) = self.offer_shown(order.side, at)
             {
                 self.take(k, &offer, within);
-                self.remember_taken(order.side);
+                let best = self.best_taken(order.side);
+                self.taken.from(order.side, best);
             }
         }
         self.wait_or_end(k, at);
@@ -58,29 +60,13 @@ impl Floor {
     /// What an order finds within its limit [units]. What was taken of it already is not there a second time, though a
     /// replayed market goes on to show it.
     fn takable(&self, order: &Resting) -> f64 {
-        let own = self.taken_from.is_some_and(|(side, ..)| side == order.side);
-        (self.shown.takable(order.side, order.limit()) - if own { self.taken } else { 0.0 }).max(0.0)
-    }
-
-    /// Remembers from which best price it was taken, and what was displayed there.
-    fn remember_taken(&mut self, side: Side) {
-        self.taken_from = self.best_taken(side).filter(|_| self.taken > 0.0).map(|(price, size)| (side, price, size));
+        (self.shown.takable(order.side, order.limit()) - self.taken.by(order.side)).max(0.0)
     }
 
     /// Best price an order of `side` can take, and what is displayed there.
     fn best_taken(&self, side: Side) -> Option<(Price, f64)> {
         let touch = Price::nearest(self.shown.touch(side)?).ok()?;
         Some((touch, self.shown.displayed_at(side.opposite(), touch)))
-    }
-
-    /// What was taken is there again where the best price is another, or more is displayed there.
-    fn refresh_taken(&mut self) {
-        let still = self.taken_from.is_some_and(|(side, price, size)| {
-            self.best_taken(side).is_some_and(|(now, displayed)| now == price && displayed <= size)
-        });
-        if !still {
-            (self.taken, self.taken_from) = (0.0, None);
-        }
     }
 
     /// What is left of an order that has met the market: it waits, or is over.
@@ -92,17 +78,17 @@ impl Floor {
         let reason = match (order.time_in_force, order.kind) {
             (TimeInForce::FillOrKill, _) => Some(Reason::FillOrKill),
             (TimeInForce::ImmediateOrCancel, _) => Some(Reason::TimeInForce),
-            (_, OrderKind::Market) if order.met && !order.waits_for_parent() => Some(Reason::NoVolume),
+            (_, OrderKind::Market) if order.met && !order.waits_for_parent() => Some(order.exhausted()),
             _ => None,
         };
         match reason {
             Some(reason) => self.end(k, at, reason),
-            None => self.join(k, at),
+            None => self.join(k),
         }
     }
 
     /// An order with a limit joins the end of the queue at its price.
-    pub(super) fn join(&mut self, k: usize, _at: Timestamp) {
+    fn join(&mut self, k: usize) {
         let order = &self.resting[k];
         if let (OrderKind::Limit { price }, true) = (order.kind, order.place == Place::default()) {
             self.resting[k].place = Place::behind(self.shown.displayed_at(order.side, price), self.others.events());
@@ -116,7 +102,7 @@ impl Floor {
             return;
         }
         let book = quote.book();
-        if self.resting.is_empty() && self.taken == 0.0 {
+        if self.resting.is_empty() && self.taken.is_nothing() {
             self.shown = Shown::Quote(book);
             return;
         }
@@ -164,8 +150,11 @@ impl Floor {
         if let Shown::Depth(book) = &mut self.shown {
             book.settle();
         }
-        if self.taken > 0.0 {
-            self.refresh_taken();
+        if !self.taken.is_nothing() {
+            for side in [Side::Buy, Side::Sell] {
+                let best = self.best_taken(side);
+                self.taken.refresh(side, best);
+            }
         }
         if self.resting.is_empty() {
             return;
@@ -185,12 +174,12 @@ impl Floor {
             OrderKind::Limit { price } => {
                 let crossed = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok());
                 let Some(offer) =
-                    crossed.filter(|touch| reaches(order.side, *touch, price)).and_then(|_| self.offer_at(price, at))
+                    crossed.filter(|touch| order.side.accepts(*touch, price)).and_then(|_| self.offer_at(price, at))
                 else {
                     return;
                 };
                 // What we took ourselves is shown on; nobody new is there.
-                if self.taken > 0.0 && self.takable(&order) <= 0.0 {
+                if self.taken.by(order.side) > 0.0 && self.takable(&order) <= 0.0 {
                     return;
                 }
                 // Whoever shows a price at or beyond our limit has passed us by: we stood before them.
@@ -213,7 +202,7 @@ impl Floor {
         let Ok(price) = Price::nearest(print.price) else { return };
         if matches!(self.shown, Shown::Nothing | Shown::Last(_)) {
             self.shown = Shown::Last(price);
-            (self.taken, self.taken_from) = (0.0, None);
+            self.taken = Taken::default();
         }
         if self.resting.is_empty() {
             return;
@@ -239,7 +228,7 @@ impl Floor {
                 continue;
             };
             // A trade that took from our own side says nothing of whoever rests on the other.
-            if print.aggressor == Some(order.side) || !reaches(order.side, price, limit) {
+            if print.aggressor == Some(order.side) || !order.side.accepts(price, limit) {
                 continue;
             }
             let reached = if price == limit {
@@ -306,22 +295,7 @@ impl Floor {
     }
 }
 
-/// Whether a price of others reaches the limit of an order of `side`.
-fn reaches(side: Side, price: Price, limit: Price) -> bool {
-    match side {
-        Side::Buy => price <= limit,
-        Side::Sell => price >= limit,
-    }
-}
-
 /// A size as a quantity, as large as can be where it is not known.
 fn quantity_of(size: f64) -> Quantity {
     Quantity::nearest(size.min(9e9)).unwrap_or(Quantity::ZERO)
-}
-
-impl Resting {
-    /// Whether part of it still waits for its parent to fill.
-    pub fn waits_for_parent(&self) -> bool {
-        self.released < self.left
-    }
 }

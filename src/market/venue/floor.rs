@@ -6,8 +6,10 @@ use crate::market::{
 use crate::sim2real::{Run, Tick, Timestamp};
 
 use super::by_order::Others;
+use super::queue::Place;
 use super::resting::{Filled, Outcome, Resting, What};
 use super::shown::Shown;
+use super::taken::Taken;
 use super::{Intrabar, LimitFill, QueueModel};
 
 /// How a venue fills orders, as far as that is no mechanism.
@@ -47,10 +49,8 @@ pub(in crate::market) struct Floor {
     pub(super) shown: Shown,
     /// What is held by what was filled here, whether or not anybody knows yet.
     pub(super) held: Quantity,
-    /// What was taken of the volume of the bar or quote that is there now [units].
-    pub(super) taken: f64,
-    /// From which side, best price and size it was taken, where prices are displayed.
-    pub(super) taken_from: Option<(Side, Price, f64)>,
+    /// What was taken of the volume that is there now.
+    pub(super) taken: Taken,
     /// Number of the row that is there now: of bars, quotes, trades, changes of the book.
     pub(super) rows: [usize; 4],
     /// Bars within which the order of the extremes decided what was filled.
@@ -86,8 +86,7 @@ impl Floor {
             resting: Vec::new(),
             shown: Shown::Nothing,
             held: Quantity::ZERO,
-            taken: 0.0,
-            taken_from: None,
+            taken: Taken::default(),
             rows: [0; 4],
             ambiguous: 0,
             by_bars: false,
@@ -143,7 +142,7 @@ impl Floor {
         let cap = order.order.participation_limit;
         if cap.is_finite() {
             // Earlier orders took their part of the same volume.
-            let left = (cap * offer.volume - self.taken).max(0.0);
+            let left = (cap * offer.volume - self.taken.by(side)).max(0.0);
             wanted = wanted.min(self.increments.whole_lots(Quantity::nearest(left.min(9e9)).unwrap_or(wanted)));
         }
         self.resting[k].met = true;
@@ -159,10 +158,10 @@ impl Floor {
         if quantity <= Quantity::ZERO {
             return;
         }
-        self.taken += quantity.to_f64();
+        self.taken.add(side, quantity.to_f64());
         // An order with a limit pays no more than that, whatever mechanisms say.
         let (mut price, mut model_price) = (self.rounded(side, model_price), model_price);
-        if let Some(limit) = limit.filter(|limit| !self.resting[k].accepts_price(price, *limit)) {
+        if let Some(limit) = limit.filter(|limit| !side.accepts(price, *limit)) {
             (price, model_price) = (limit, limit.to_f64());
         }
         self.fill(k, Role::Taker, quantity, price, model_price, fee, offer);
@@ -215,7 +214,8 @@ impl Floor {
         let order = &mut self.resting[k];
         order.left = order.left - quantity;
         order.released = order.released - quantity;
-        let (id, side, link, whole) = (order.id, order.side, order.link, order.left <= Quantity::ZERO);
+        order.filled = order.filled + quantity;
+        let (id, side, link) = (order.id, order.side, order.link);
         let queued_behind = if role == Role::Maker { order.place.joined_behind } else { 0.0 };
         self.held = self.held + quantity.signed(side);
         let filled = Filled {
@@ -225,7 +225,6 @@ impl Floor {
             model_price,
             mid: offer.mid,
             fee,
-            whole,
             queued_behind,
             row: offer.row,
             band: offer.band,
@@ -297,11 +296,10 @@ impl Floor {
     pub fn replace(&mut self, id: OrderId, quantity: Option<Quantity>, price: Option<Price>, at: Timestamp) -> bool {
         let Some(k) = self.resting.iter().position(|order| order.id == id) else { return false };
         let order = &mut self.resting[k];
-        let filled = Quantity::nearest(order.order.quantity).map_or(Quantity::ZERO, |whole| whole - order.left);
+        let filled = order.filled;
         let left = quantity.map_or(order.left, |whole| (whole - filled).max(Quantity::ZERO));
         let grows = left > order.left;
         let waits_for_parent = order.released < order.left;
-        order.order.quantity = (left + filled).to_f64();
         order.left = left;
         order.released = if waits_for_parent { order.released.min(left) } else { left };
         if let Some(price) = price {
@@ -312,20 +310,11 @@ impl Floor {
         if left <= Quantity::ZERO {
             self.end(k, at, Reason::Asked);
         } else if (grows || price.is_some()) && !self.by_bars {
-            self.resting[k].place = super::queue::Place::default();
-            self.join(k, at);
+            // What may now take does, and what must not is over.
+            self.resting[k].place = Place::default();
+            self.meet_shown(k, at);
         }
         self.sweep(at);
         true
-    }
-}
-
-impl Resting {
-    /// Whether `price` is no worse than `limit`.
-    fn accepts_price(&self, price: Price, limit: Price) -> bool {
-        match self.side {
-            Side::Buy => price <= limit,
-            Side::Sell => price >= limit,
-        }
     }
 }

@@ -21,8 +21,12 @@ pub(in crate::market) struct Resting {
     pub left: Quantity,
     /// How much of it may trade: less than is left for a child whose parent has filled in part.
     pub released: Quantity,
+    /// How much of it was filled.
+    pub filled: Quantity,
     /// The order as command laws have shaped it.
     pub order: InFlight,
+    /// It takes part in bars that open from then on: those of its arrival, and later ones where a bar's volume is used up.
+    pub from: Timestamp,
     /// The best price since it arrived, which a trailing stop follows.
     pub extreme: Option<Price>,
     pub place: Place,
@@ -36,7 +40,8 @@ impl Resting {
         let Ticket { side, kind, time_in_force, condition, link, .. } = *ticket;
         let released = if matches!(link, Link::ChildOf { .. }) { Quantity::ZERO } else { left };
         let (extreme, place, met) = Default::default();
-        Self { id, side, kind, time_in_force, condition, link, left, released, order, extreme, place, met }
+        let (filled, from) = (Quantity::ZERO, order.arrives_at);
+        Self { id, side, kind, time_in_force, condition, link, left, released, filled, order, from, extreme, place, met }
     }
 
     /// How much of it may trade now.
@@ -57,6 +62,21 @@ impl Resting {
             }),
             kind => kind.trigger(),
         }
+    }
+
+    /// The same, arriving at another time.
+    pub fn arriving(self, at: Timestamp) -> Self {
+        Self { order: self.order.arriving(at), from: at, ..self }
+    }
+
+    /// Whether part of it still waits for its parent to fill.
+    pub fn waits_for_parent(&self) -> bool {
+        self.released < self.left
+    }
+
+    /// Why it ends where it took all it could: the market had no more, or there was no more to close.
+    pub fn exhausted(&self) -> Reason {
+        if self.condition == Condition::ReduceOnly { Reason::ReduceOnly } else { Reason::NoVolume }
     }
 
     /// Whether it waits to be set off.
@@ -94,10 +114,7 @@ impl Resting {
 
     /// Whether it may trade at `price`.
     pub fn accepts(&self, price: Price) -> bool {
-        self.limit().is_none_or(|limit| match self.side {
-            Side::Buy => price <= limit,
-            Side::Sell => price >= limit,
-        })
+        self.limit().is_none_or(|limit| self.side.accepts(price, limit))
     }
 }
 
@@ -134,8 +151,6 @@ pub(in crate::market) struct Filled {
     pub mid: f64,
     /// Fee [currency].
     pub fee: f64,
-    /// Whether that was the last of it.
-    pub whole: bool,
     /// What stood ahead of it when it joined the queue [units]; 0 where it took.
     pub queued_behind: f64,
     /// Row of the data that brought it about, counted among rows of their kind.

@@ -89,14 +89,19 @@ fn channel_fit(comparisons: &[Comparison], weight: &ChannelWeight, seed: Seed) -
         channel: weight.channel.clone(),
         unit,
         noise_floor: weight.noise,
-        nominal_rmse: root_mean_square(&nominal),
-        recalibrated_rmse: root_mean_square(&recalibrated),
-        trued_rmse: root_mean_square(&trued),
-        nominal_mae: mean_absolute(&nominal),
-        recalibrated_mae: mean_absolute(&recalibrated),
-        trued_mae: mean_absolute(&trued),
+        nominal_rmse: told(root_mean_square(&nominal)),
+        recalibrated_rmse: told(root_mean_square(&recalibrated)),
+        trued_rmse: told(root_mean_square(&trued)),
+        nominal_mae: told(mean_absolute(&nominal)),
+        recalibrated_mae: told(mean_absolute(&recalibrated)),
+        trued_mae: told(mean_absolute(&trued)),
         improvement_ci95: improvement(&recalibrated, &trued, seed),
     })
+}
+
+/// An error, which has no bound where the run has left all bounds, be that by infinity or by no number at all.
+fn told(error: f64) -> f64 {
+    if error.is_nan() { f64::INFINITY } else { error }
 }
 
 fn root_mean_square(errors: &[f64]) -> f64 {

@@ -65,19 +65,25 @@ pub(super) fn summary<T: Twin>(
     }
 }
 
-/// By how much the held-out error of a channel falls.
+/// By how much the held-out error of a channel falls. A run that leaves all bounds has no error that could be told.
 fn gained(fit: &ChannelFit) -> String {
-    let part = 1.0 - fit.trued_rmse / fit.recalibrated_rmse;
-    let by = if part.is_finite() && part > 0.0 { format!(" by {}", percent(part)) } else { String::new() };
-    let moves = if part >= 0.0 { "falls" } else { "goes" };
-    format!(
-        "the held-out error of {} {moves}{by}, from {} to {} {} (noise floor {})",
-        fit.channel,
-        figure(fit.recalibrated_rmse, 3),
-        figure(fit.trued_rmse, 3),
-        fit.unit,
-        figure(fit.noise_floor, 3)
-    )
+    let [before, after, noise] = [fit.recalibrated_rmse, fit.trued_rmse, fit.noise_floor].map(|e| figure(e, 3));
+    let (channel, unit) = (&fit.channel, &fit.unit);
+    match [fit.recalibrated_rmse, fit.trued_rmse].map(f64::is_finite) {
+        [true, true] => {
+            let part = 1.0 - fit.trued_rmse / fit.recalibrated_rmse;
+            let by = if part.is_finite() && part > 0.0 { format!(" by {}", percent(part)) } else { String::new() };
+            let moves = if part >= 0.0 { "falls" } else { "goes" };
+            format!("the held-out error of {channel} {moves}{by}, from {before} to {after} {unit} (noise floor {noise})")
+        }
+        [false, true] => {
+            format!("the held-out error of {channel} is {after} {unit} (noise floor {noise}); without, the run leaves all bounds")
+        }
+        [true, false] => {
+            format!("the held-out run of {channel} leaves all bounds; without, its error is {before} {unit} (noise floor {noise})")
+        }
+        [false, false] => format!("the held-out run of {channel} leaves all bounds, as it does without"),
+    }
 }
 
 /// A part of one; nothing is certain, and .2 % is not nothing.
@@ -113,6 +119,28 @@ fn listed(names: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_run_that_leaves_all_bounds_has_no_error() {
+        let fit = |recalibrated_rmse, trued_rmse| ChannelFit {
+            channel: "position".into(),
+            unit: "rad".into(),
+            recalibrated_rmse,
+            trued_rmse,
+            noise_floor: 0.1,
+            nominal_rmse: 3.0,
+            nominal_mae: 2.0,
+            recalibrated_mae: 1.0,
+            trued_mae: 0.5,
+            improvement_ci95: [0.0; 2],
+        };
+        let said = |before, after| gained(&fit(before, after));
+        assert_eq!(said(2.0, 1.0), "the held-out error of position falls by 50 %, from 2.00 to 1.00 rad (noise floor 0.100)");
+        for (before, after) in [(f64::NAN, 1.0), (1.0, f64::INFINITY), (f64::NAN, f64::NAN)] {
+            let said = said(before, after);
+            assert!(said.contains("leaves all bounds") && !said.contains("NaN") && !said.contains("inf"), "{said}");
+        }
+    }
 
     #[test]
     fn figures_have_three_digits() {
