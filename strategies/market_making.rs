@@ -118,6 +118,9 @@ impl Strategy for MarketMaking {
     fn name(&self) -> &str {
         KIND.name
     }
+    fn copied(&self) -> Option<Box<dyn Strategy>> {
+        Some(Box::new(self.clone()))
+    }
 
     fn lookback(&self) -> usize {
         1

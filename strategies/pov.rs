@@ -90,6 +90,9 @@ impl Strategy for Pov {
     fn name(&self) -> &str {
         KIND.name
     }
+    fn copied(&self) -> Option<Box<dyn Strategy>> {
+        Some(Box::new(self.clone()))
+    }
 
     fn lookback(&self) -> usize {
         1

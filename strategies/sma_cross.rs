@@ -97,6 +97,9 @@ impl Strategy for SmaCross {
     fn name(&self) -> &str {
         KIND.name
     }
+    fn copied(&self) -> Option<Box<dyn Strategy>> {
+        Some(Box::new(self.clone()))
+    }
 
     fn lookback(&self) -> usize {
         self.parameters.slow + 1

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::io::{InputError, OutputFolder, Overwrite, RunFile, hint_among};
-use crate::market::{Backtest, Instrument, Record, RunOutputs, Session, Strategy, explained, prepare_run};
+use crate::market::{
+    Instrument, PreparedRun, Record, RunOutputs, Session, Strategy, explained, prepare_run, prepare_streaming_run,
+};
 use crate::report::quantity::UNDEFINED;
 use crate::strategies::{self, StrategyError};
 
@@ -47,8 +49,8 @@ impl Run {
         if let Some(folder) = &self.out {
             OutputFolder::create(folder, overwrite)?.check_free(&RunOutputs::FILES)?;
         }
-        let prepared = prepare_run(&file)?;
-        let record = run(&prepared.backtest, strategy.as_mut(), &screen.progress());
+        let prepared = if file.run.stream { prepare_streaming_run(&file)? } else { prepare_run(&file)? };
+        let record = run(&prepared, strategy.as_mut(), &screen.progress());
         let record = record.map_err(|error| explained(&file, &error))?;
         let outputs = prepared.outputs(&record).map_err(|error| Stop::Bug(error.to_string()))?;
         let mut text = if self.json { outputs.json()? } else { told(&outputs, screen) };
@@ -114,14 +116,14 @@ pub(super) fn explained_strategy(file: &RunFile, error: &StrategyError) -> Input
 const EVENTS_A_TURN: usize = 20_000;
 
 fn run(
-    backtest: &Backtest,
+    prepared: &PreparedRun,
     strategy: &mut dyn Strategy,
     progress: &Progress,
 ) -> Result<Record, crate::market::BacktestError> {
-    let mut session: Session<'_> = backtest.start();
+    let mut session: Session<'_> = prepared.start()?;
     loop {
         let (done, of) = session.progress();
-        progress.tell("running", done, of);
+        progress.tell("running", done, of.unwrap_or_default());
         for _ in 0..EVENTS_A_TURN {
             if session.step(strategy)?.is_none() {
                 return session.finish();

@@ -119,11 +119,14 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Tells that `step` is being done, and how many of how many parts of it lie behind.
+    /// Tells that `step` is being done, and how many of how many parts of it lie behind; 0 where nobody knows how many there are.
     pub fn tell(&self, step: &str, done: usize, of: usize) {
         if let Some(bar) = &self.bar {
             bar.set_message(step.to_owned());
-            bar.set_length(of as u64);
+            match of {
+                0 => bar.unset_length(),
+                _ => bar.set_length(of as u64),
+            }
             bar.set_position(done as u64);
         }
         if self.lines

@@ -13,6 +13,7 @@ use super::data_table::{DataTable, data_entry};
 use super::document::{Document, HINT};
 use super::error::InputError;
 use super::feed_format::{FeedFormat, check_file};
+use super::feed_rules::span;
 use super::instrument_entry::{InstrumentEntry, check_instruments};
 use super::quantity::{MechanismEntry, check_mechanisms};
 use super::sweep_section::{SweepSection, SweepTable};
@@ -57,6 +58,13 @@ pub struct RunSection {
     /// The instant from which on data no longer count; none for all to the last.
     #[serde(default, deserialize_with = "instant")]
     pub end: Option<Timestamp>,
+    /// Data are read while the run goes, so that what is in memory does not grow with their length.
+    #[serde(default)]
+    pub stream: bool,
+    /// Time for which the equity curve keeps its first, lowest, highest and last point alone [ns]; none for a point an event, or a
+    /// second where data are streamed.
+    #[serde(default, deserialize_with = "span")]
+    pub equity_every: Option<i64>,
 }
 
 /// What a data file holds.

@@ -3,9 +3,10 @@
 use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
+use super::line::{Line, RowKind};
 use super::{
-    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError, Matching, MoneyError,
-    QueueModel, Reference, Session, Strategy,
+    Cash, DataNotes, Execution, Feed, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError,
+    Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy, StreamError,
 };
 
 /// A backtest, as it was set up.
@@ -34,6 +35,8 @@ pub struct Settings {
     pub matching: Matching,
     /// How long messages take.
     pub latencies: Latencies,
+    /// Time for which the equity curve keeps its first, lowest, highest and last point alone [ns]; none to keep one an event.
+    pub equity_every: Option<i64>,
 }
 
 impl Settings {
@@ -41,7 +44,8 @@ impl Settings {
     #[must_use]
     pub fn with_cash(cash: Cash) -> Self {
         let (matching, latencies) = Default::default();
-        Self { cash, seed: Seed::default(), max_leverage: 1.0, reference: None, matching, latencies }
+        let (seed, max_leverage, reference, equity_every) = (Seed::default(), 1.0, None, None);
+        Self { cash, seed, max_leverage, reference, matching, latencies, equity_every }
     }
 }
 
@@ -76,6 +80,12 @@ pub enum BacktestError {
         /// What is wrong with it.
         error: MoneyError,
     },
+    /// A time between points of the equity curve that is none.
+    #[error("points of the equity curve are to be {0} ns apart\nhint: give a time above 0, such as \"1s\"")]
+    EquityEvery(i64),
+    /// Data that cannot be read, or cannot be.
+    #[error(transparent)]
+    Data(Box<StreamError>),
     /// Something the account cannot book.
     #[error("{place}: {error}")]
     Account {
@@ -127,12 +137,36 @@ pub struct Held {
 pub struct Record {
     /// Orders, fills and refusals.
     pub blotter: Blotter,
-    /// One point an event, and one for fills after the last.
+    /// One point an event, and one for fills after the last; fewer where [`Settings::equity_every`] says so.
     pub equity: Vec<EquityPoint>,
     /// The account at the end.
     pub ledger: Ledger,
     /// How much was held.
     pub held: Held,
+    /// What the data were, one an instrument.
+    pub data: Vec<DataSeen>,
+}
+
+/// What the data of an instrument were.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct DataSeen {
+    /// Whether there were quotes.
+    pub quoted: bool,
+    /// Whether there were bars, and nothing finer.
+    pub bars_alone: bool,
+    /// What was found in the files, one a file.
+    pub notes: Vec<DataNotes>,
+}
+
+impl DataSeen {
+    pub(super) fn of(line: &Line<'_>) -> Self {
+        let finer = [RowKind::Trades, RowKind::Depth, RowKind::Orders, RowKind::Quotes];
+        Self {
+            quoted: line.tells(RowKind::Quotes),
+            bars_alone: line.tells(RowKind::Bars) && !finer.iter().any(|kind| line.tells(*kind)),
+            notes: line.notes(),
+        }
+    }
 }
 
 impl Backtest {
@@ -152,8 +186,33 @@ impl Backtest {
         if histories.iter().all(History::is_empty) {
             return Err(BacktestError::NoData);
         }
+        Self::of(instruments, histories, venue, settings)
+    }
+
+    /// A backtest of `instruments` whose data are not held in memory: it [starts on](Self::start_on) streams.
+    ///
+    /// # Errors
+    /// As [`Backtest::new`], but for data.
+    pub fn streaming(
+        instruments: Vec<Instrument>,
+        venue: Assembly<Execution>,
+        settings: Settings,
+    ) -> Result<Self, BacktestError> {
+        let histories = vec![History::default(); instruments.len()];
+        Self::of(instruments, histories, venue, settings)
+    }
+
+    fn of(
+        instruments: Vec<Instrument>,
+        histories: Vec<History>,
+        venue: Assembly<Execution>,
+        settings: Settings,
+    ) -> Result<Self, BacktestError> {
         if !settings.max_leverage.is_finite() || settings.max_leverage <= 0.0 {
             return Err(BacktestError::Leverage(settings.max_leverage));
+        }
+        if let Some(every) = settings.equity_every.filter(|every| *every <= 0) {
+            return Err(BacktestError::EquityEvery(every));
         }
         let Latencies { feed, order, response, compute, .. } = &settings.latencies;
         [feed, order, response, compute].into_iter().try_for_each(|latency| latency.check())?;
@@ -202,7 +261,24 @@ impl Backtest {
     /// Starts it, before its first event.
     #[must_use]
     pub fn start(&self) -> Session<'_> {
-        Session::new(self)
+        Session::new(self, Feed::new(&self.histories))
+    }
+
+    /// Starts it on streams, one set an instrument, before its first event: of the data only what lies around the present is in
+    /// memory. What it does is the same as on whole histories of the same rows.
+    ///
+    /// # Errors
+    /// What the streams refuse of their first rows; not as many sets as instruments; no data at all.
+    pub fn start_on(&self, sources: Vec<Sources>) -> Result<Session<'_>, BacktestError> {
+        let (instruments, histories) = (self.instruments.len(), sources.len());
+        if instruments != histories {
+            return Err(BacktestError::Unmatched { instruments, histories });
+        }
+        let feed = Feed::streaming(sources).map_err(|error| BacktestError::Data(Box::new(error)))?;
+        if feed.peek().is_none() {
+            return Err(BacktestError::NoData);
+        }
+        Ok(Session::new(self, feed))
     }
 
     /// Runs it from the first event to the last.

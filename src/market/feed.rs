@@ -2,71 +2,15 @@
 
 use crate::sim2real::Timestamp;
 
-use super::{Bar, DepthChange, Event, EventKind, History, OrderEvent, Print, Quotes};
-
-/// The rows of one kind of one instrument.
-#[derive(Debug, Clone, Copy)]
-enum Rows<'d> {
-    Bars(&'d [Bar]),
-    Quotes(&'d Quotes),
-    Prints(&'d [Print], &'d History),
-    Depth(&'d [DepthChange]),
-    Orders(&'d [OrderEvent]),
-}
-
-impl Rows<'_> {
-    fn len(&self) -> usize {
-        match self {
-            Self::Bars(rows) => rows.len(),
-            Self::Quotes(rows) => rows.len(),
-            Self::Prints(rows, _) => rows.len(),
-            Self::Depth(rows) => rows.len(),
-            Self::Orders(rows) => rows.len(),
-        }
-    }
-
-    /// When row `row` happens, at the exchange: a bar when it is over. [`Timestamp::MAX`] beyond the last.
-    #[inline]
-    fn time(&self, row: usize) -> Timestamp {
-        let time = match self {
-            Self::Bars(rows) => rows.get(row).map(|bar| bar.known_at),
-            Self::Quotes(rows) => rows.times().get(row).copied(),
-            Self::Prints(rows, _) => rows.get(row).map(|print| print.time),
-            Self::Depth(rows) => rows.get(row).map(|change| change.time),
-            Self::Orders(rows) => rows.get(row).map(|event| event.time),
-        };
-        time.unwrap_or(Timestamp::MAX)
-    }
-
-    /// When the row can be known.
-    #[inline]
-    fn known_at(&self, row: usize) -> Timestamp {
-        match self {
-            Self::Prints(_, history) => history.print_known_at(row).unwrap_or(Timestamp::MAX),
-            Self::Depth(rows) => rows.get(row).map_or(Timestamp::MAX, |change| change.known_at),
-            Self::Orders(rows) => rows.get(row).map_or(Timestamp::MAX, |event| event.known_at),
-            _ => self.time(row),
-        }
-    }
-
-    /// One row behind the last of those that belong to the same instant as `row`: a book is told in many changes, and is
-    /// whole when all of one instant are in.
-    #[inline]
-    fn batch(&self, row: usize) -> usize {
-        match self {
-            Self::Depth(rows) => row + rows[row..].iter().take_while(|change| change.time == rows[row].time).count(),
-            Self::Orders(rows) => row + rows[row..].iter().take_while(|event| event.time == rows[row].time).count(),
-            _ => row + 1,
-        }
-    }
-}
+use super::line::{Line, RowKind};
+use super::stream::StreamError;
+use super::{Event, History, Sources};
 
 /// The rows of one kind of one instrument, and how far they have been read.
-#[derive(Debug, Clone)]
-struct Track<'d> {
+#[derive(Debug, Clone, Copy)]
+struct Track {
     instrument: usize,
-    kind: EventKind,
-    rows: Rows<'d>,
+    kind: RowKind,
     next: usize,
 }
 
@@ -85,42 +29,50 @@ pub struct Arrival {
 
 /// Everything that happens, in order: by time; at one time by instrument, and within it bars, trades, changes of the book,
 /// quotes.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Feed<'d> {
-    tracks: Vec<Track<'d>>,
+    lines: Vec<Line<'d>>,
+    tracks: Vec<Track>,
     /// Next time of each track.
     times: Vec<Timestamp>,
     /// A tournament of the tracks: at each inner node the loser of the match there, and at 0 the winner of all.
     losers: Vec<u32>,
-    last: Option<Timestamp>,
-    events: usize,
+    /// The track given out last has to read on before the next row.
+    low: Option<u32>,
 }
 
 impl<'d> Feed<'d> {
     /// A feed of the given histories, one an instrument.
     #[must_use]
     pub fn new(histories: &'d [History]) -> Self {
-        let mut tracks = Vec::new();
-        for (instrument, history) in histories.iter().enumerate() {
-            for (kind, rows) in [
-                (EventKind::Bar, Rows::Bars(history.bars())),
-                (EventKind::Trade, Rows::Prints(history.prints(), history)),
-                (EventKind::Depth, Rows::Depth(history.depth())),
-                (EventKind::Depth, Rows::Orders(history.order_events())),
-                (EventKind::Quote, Rows::Quotes(history.quotes())),
-            ] {
-                if rows.len() > 0 {
-                    tracks.push(Track { instrument, kind, rows, next: 0 });
-                }
-            }
-        }
-        let times: Vec<Timestamp> = tracks.iter().map(|track| track.rows.time(0)).collect();
-        let ends = tracks.iter().map(|track| track.rows.time(track.rows.len() - 1));
-        let last = ends.max();
-        let events = tracks.iter().map(|track| track.rows.len()).sum();
-        let mut feed = Self { losers: vec![0; tracks.len()], tracks, times, last, events };
+        Self::of(histories.iter().map(Line::whole).collect())
+    }
+
+    /// A feed of streams, of each instrument those at its place. It is for who reads on when it [is low](Self::is_low).
+    ///
+    /// # Errors
+    /// What the streams refuse of their first rows.
+    pub fn streaming(sources: Vec<Sources>) -> Result<Feed<'static>, StreamError> {
+        Ok(Feed::of(sources.into_iter().map(Line::of).collect::<Result<_, _>>()?))
+    }
+
+    fn of(lines: Vec<Line<'d>>) -> Self {
+        let all = lines.iter().enumerate().flat_map(|(instrument, line)| {
+            let told = RowKind::ALL.into_iter().filter(|kind| line.tells(*kind));
+            told.map(move |kind| Track { instrument, kind, next: 0 })
+        });
+        let tracks: Vec<Track> = all.collect();
+        let times = tracks.iter().map(|track| lines[track.instrument].time(track.kind, 0)).collect();
+        let mut feed = Self { losers: vec![0; tracks.len()], lines, tracks, times, low: None };
         feed.build();
         feed
+    }
+
+    /// The same from here on, where all data are in memory: streams give their rows once.
+    pub(super) fn forked(&self) -> Option<Self> {
+        let lines = self.lines.iter().map(Line::forked).collect::<Option<_>>()?;
+        let Self { tracks, times, losers, low, .. } = self;
+        Some(Self { lines, tracks: tracks.clone(), times: times.clone(), losers: losers.clone(), low: *low })
     }
 
     /// When the next event happens.
@@ -131,23 +83,45 @@ impl<'d> Feed<'d> {
         Some(self.times[winner as usize]).filter(|time| *time < Timestamp::MAX)
     }
 
-    /// When the last event of all happens.
+    /// Number of all rows, where all are in memory.
     #[must_use]
-    pub fn end(&self) -> Option<Timestamp> {
-        self.last
+    pub fn rows(&self) -> Option<usize> {
+        self.lines.iter().map(Line::rows).sum()
     }
 
-    /// Number of all rows.
-    #[must_use]
-    pub fn events(&self) -> usize {
-        self.events
+    /// The data of an instrument.
+    #[inline(always)]
+    pub(super) fn line(&self, instrument: usize) -> &Line<'d> {
+        &self.lines[instrument]
+    }
+
+    /// The data of all instruments.
+    pub(super) fn lines(&self) -> &[Line<'d>] {
+        &self.lines
     }
 
     /// The row of the next bar of an instrument, which is not over yet.
     #[must_use]
     pub(super) fn next_bar(&self, instrument: usize) -> Option<usize> {
-        let of = |track: &&Track<'_>| track.instrument == instrument && track.kind == EventKind::Bar;
+        let of = |track: &&Track| track.instrument == instrument && track.kind == RowKind::Bars;
         self.tracks.iter().find(of).map(|track| track.next)
+    }
+
+    /// Whether rows have to be [read](Self::read_on) before the next event.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_low(&self) -> bool {
+        self.low.is_some()
+    }
+
+    /// Reads on where it is low; of the instrument and kind that came last, rows before `keep` may be forgotten.
+    ///
+    /// # Errors
+    /// What the stream refuses.
+    pub fn read_on(&mut self, keep: usize) -> Result<(), StreamError> {
+        let Some(low) = self.low.take() else { return Ok(()) };
+        let Track { instrument, kind, next } = self.tracks[low as usize];
+        self.lines[instrument].read_on(kind, next, keep)
     }
 
     fn build(&mut self) {
@@ -195,12 +169,17 @@ impl Iterator for Feed<'_> {
         let time = self.peek()?;
         let winner = self.losers[0];
         let track = &mut self.tracks[winner as usize];
-        let (row, end) = (track.next, track.rows.batch(track.next));
-        let known_at = track.rows.known_at(row).max(time);
-        let event = Event { time, instrument: track.instrument, kind: track.kind };
+        let Track { instrument, kind, next: row } = *track;
+        let line = &self.lines[instrument];
+        let end = line.batch(kind, row);
+        let known_at = line.known_at(kind, row).max(time);
+        let event = Event { time, instrument, kind: kind.event() };
         track.next = end;
+        if line.is_low(kind, end) {
+            self.low = Some(winner);
+        }
         // Rows are in the order in which they were known; the exchange's clock may step back a little.
-        self.times[winner as usize] = track.rows.time(end).max(time);
+        self.times[winner as usize] = line.time(kind, end).max(time);
         self.replay(winner);
         Some(Arrival { event, row, end, known_at })
     }
@@ -209,7 +188,7 @@ impl Iterator for Feed<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::market::{Bar, Level, Price, Quotes};
+    use crate::market::{Bar, EventKind, Level, Price, Quotes};
     use proptest::prelude::*;
 
     fn bar(known_at: i64) -> Bar {
@@ -229,7 +208,7 @@ mod tests {
             History::new(vec![bar(3), bar(5)], Quotes::default()).unwrap(),
         ];
         let feed = Feed::new(&histories);
-        assert_eq!((feed.peek(), feed.end(), feed.events()), (Some(Timestamp(3)), Some(Timestamp(8)), 7));
+        assert_eq!((feed.peek(), feed.rows()), (Some(Timestamp(3)), Some(7)));
         let order: Vec<(i64, usize, EventKind, usize)> =
             feed.map(|a| (a.event.time.0, a.event.instrument, a.event.kind, a.row)).collect();
         use EventKind::{Bar, Quote};

@@ -1,8 +1,9 @@
 //! What is known of one instrument: all that a strategy may see, and nothing that is still to come.
 
+use super::line::{Line, RowKind};
 use super::past::{Past, PastQuotes};
 use super::venue::Others;
-use super::{Arrival, Bar, DepthBook, History, OrderId, OrderKind, Price, Print, Quantity, Side};
+use super::{Arrival, Bar, DepthBook, OrderId, OrderKind, Price, Print, Quantity, Side};
 
 /// An order of ours that works, as far as its owner knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,12 +39,13 @@ pub(super) struct Known {
 
 impl Known {
     /// Takes in what changed in the book, and gives its mid in whole 1e-9.
-    pub fn learn_depth(&mut self, history: &History, arrival: &Arrival) -> Option<Price> {
+    pub fn learn_depth(&mut self, line: &Line<'_>, arrival: &Arrival) -> Option<Price> {
         let book = self.book.as_mut()?;
-        if history.order_events().is_empty() {
-            history.depth()[arrival.row..arrival.end].iter().for_each(|change| book.apply(change));
+        let rows = arrival.row..arrival.end;
+        if line.tells(RowKind::Orders) {
+            line.order_events(rows).iter().for_each(|event| self.others.show(event, book));
         } else {
-            history.order_events()[arrival.row..arrival.end].iter().for_each(|event| self.others.show(event, book));
+            line.depth(rows).iter().for_each(|change| book.apply(change));
         }
         book.settle();
         let (bid, ask) = (book.best(Side::Buy)?, book.best(Side::Sell)?);

@@ -4,13 +4,12 @@ use std::fmt;
 
 use rand::Rng;
 use rand::RngExt as _;
-use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, Exp, LogNormal};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::sim2real::{Seed, Timestamp};
+use crate::sim2real::{Draws, Seed, Timestamp};
 
 /// How long a message takes.
 ///
@@ -207,13 +206,13 @@ impl Default for Latencies {
 }
 
 /// Draws latencies: each kind of message from a stream of its own.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Clocks {
     latencies: Latencies,
-    feed: ChaCha8Rng,
-    order: ChaCha8Rng,
-    response: ChaCha8Rng,
-    compute: ChaCha8Rng,
+    feed: Draws,
+    order: Draws,
+    response: Draws,
+    compute: Draws,
     strain: Watch,
     /// When the last order, and the last report, arrives: on one line nothing overtakes.
     last: [Timestamp; 2],

@@ -10,12 +10,15 @@ mod booking;
 mod calendar;
 mod carry;
 mod check;
+mod checkpoint;
 mod covariate;
 mod daily;
 mod data_notes;
+mod data_summary;
 mod depth;
 mod depth_book;
 mod desk;
+mod equity_curve;
 mod execution;
 mod feed;
 mod history;
@@ -26,6 +29,7 @@ mod instrument;
 mod known;
 mod latency;
 mod ledger;
+mod line;
 mod log_entry;
 #[cfg(feature = "io")]
 mod log_folder;
@@ -51,6 +55,8 @@ mod run_log;
 mod run_needs;
 #[cfg(feature = "io")]
 mod run_page;
+#[cfg(feature = "io")]
+mod run_stream;
 mod session;
 mod strategy;
 mod stream;
@@ -71,7 +77,7 @@ pub use audit::{
     Audit, AuditSettings, AuditVerdict, Change, Cut, Difference, Engine, FillFault, Impossible, KnownEarly, Subject, audit,
     audit_engine,
 };
-pub use backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
+pub use backtest::{Backtest, BacktestError, DataSeen, EquityPoint, Held, Record, Settings};
 pub use bar::Bar;
 pub use blotter::{Blotter, Fill, FillCost, Order, Rejection, Status, Why};
 pub use book::{Book, Level, Walk};
@@ -79,8 +85,10 @@ pub use calendar::{
     Calendar, CalendarError, CalendarFault, CalendarTable, Day, Hours, LocalTime, Observed, OccasionRow, SessionRow, Trading,
 };
 pub use check::{check_strategy, check_strategy_on};
+pub use checkpoint::{AnotherFill, Checkpoint, ForkError, Moment};
 pub use daily::Daily;
 pub use data_notes::{DataNotes, Finding, Treatment};
+pub use data_summary::DataSummary;
 pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
 pub use depth_book::DepthBook;
 pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
@@ -93,6 +101,7 @@ pub use ledger::{
     Balance, ChargeKind, Charges, Closing, Conversion, Dividend, Fraction, Income, Ledger, LedgerError, Margin, Multiplier,
     Position, Requirement, Split, Terms, Trade,
 };
+pub use line::Sources;
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
 #[cfg(feature = "io")]
 pub use log_folder::{LogSettings, read_log};
@@ -108,6 +117,8 @@ pub use reason::Reason;
 pub use run::{PreparedRun, explained, prepare_run};
 #[cfg(feature = "io")]
 pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
+#[cfg(feature = "io")]
+pub use run_stream::prepare_streaming_run;
 pub use session::Session;
 pub use strategy::{Event, EventKind, News, Notice, Orders, Strategy, View};
 #[cfg(feature = "io")]

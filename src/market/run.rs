@@ -8,7 +8,7 @@ use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 use super::run_log::InputFile;
 use super::{
     Backtest, BacktestError, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError, Provenance,
-    Record, Reference, RunOutputs, Settings, run_needs,
+    Record, Reference, RunOutputs, Settings, StreamError, run_needs,
 };
 
 /// A backtest as a run declares it, with its data read.
@@ -18,6 +18,8 @@ pub struct PreparedRun {
     pub backtest: Backtest,
     /// What it was made of.
     pub provenance: Provenance,
+    /// The run whose files are read while it goes; none where its data are in memory.
+    pub(super) streamed: Option<Box<RunFile>>,
 }
 
 /// Sets up the backtest of `run`, and reads its data. The strategy is for the caller to build, from `run.strategy` and
@@ -30,8 +32,7 @@ pub struct PreparedRun {
 pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     // What needs no data is said before they are read.
     venue(run)?;
-    let mut inputs = vec![own_document(run)?];
-    let mut read = Vec::new();
+    let (mut inputs, mut read) = (Vec::new(), Vec::new());
     for entry in &run.data {
         let history = history(entry)?;
         let rows = history.rows();
@@ -41,8 +42,13 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     let joined = run.instruments.iter().enumerate().map(|(index, entry)| joined(run, index, &entry.symbol, &mut read));
     let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
     let backtest = set_up(run, histories)?;
+    Ok(PreparedRun { provenance: provenance(run, &backtest, inputs)?, backtest, streamed: None })
+}
+
+/// What `backtest`, that of `run`, is made of: its document and `files`.
+pub(super) fn provenance(run: &RunFile, backtest: &Backtest, files: Vec<InputFile>) -> Result<Provenance, InputError> {
     let venue = backtest.venue();
-    let provenance = Provenance {
+    Ok(Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: run.run.seed,
         currency: run.run.currency.clone(),
@@ -50,9 +56,8 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
         mechanisms: venue.modelled().into_iter().map(str::to_owned).collect(),
         reference: backtest.settings().reference.unwrap_or_else(|| Reference::suiting(venue)),
         zone: zone(run),
-        inputs,
-    };
-    Ok(PreparedRun { backtest, provenance })
+        inputs: [own_document(run)?].into_iter().chain(files).collect(),
+    })
 }
 
 /// The backtest of `run` on data that were read.
@@ -60,17 +65,23 @@ fn set_up(run: &RunFile, histories: Vec<History>) -> Result<Backtest, InputError
     let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     let venue = venue(run)?;
     run_needs::check(run, &venue, &instruments, &histories)?;
+    let settings = settings(run, &histories)?;
+    Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))
+}
+
+/// What else the backtest of `run` depends on.
+pub(super) fn settings(run: &RunFile, histories: &[History]) -> Result<Settings, InputError> {
     let cash = Cash::nearest(run.run.cash).map_err(|error| money(run, &["run", "cash"], &error))?;
     let borrowing_nothing = Settings::with_cash(cash);
-    let settings = Settings {
+    Ok(Settings {
         cash,
         seed: Seed(run.run.seed),
         max_leverage: run.run.max_leverage.unwrap_or(borrowing_nothing.max_leverage),
-        reference: reference(run, &histories)?,
+        reference: reference(run, histories)?,
         matching: run.matching::<Matching>()?,
         latencies: run.latency::<Latencies>()?,
-    };
-    Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))
+        equity_every: run.run.equity_every.or(run.run.stream.then_some(Timestamp::NANOS)),
+    })
 }
 
 impl PreparedRun {
@@ -87,7 +98,17 @@ impl PreparedRun {
     /// # Errors
     /// If an amount of cash is beyond what can be held.
     pub fn outputs(&self, record: &Record) -> Result<RunOutputs, MoneyError> {
-        RunOutputs::new(self.provenance.clone(), &self.backtest, record)
+        let mut provenance = self.provenance.clone();
+        if let Some(run) = &self.streamed {
+            // Only now is known how many rows the files have.
+            for (entry, file) in run.data.iter().zip(provenance.inputs.iter_mut().skip(1)) {
+                let instrument = run.instruments.iter().position(|instrument| instrument.symbol == entry.symbol);
+                let seen = instrument.and_then(|k| record.data.get(k));
+                let notes = seen.and_then(|seen| seen.notes.iter().find(|notes| notes.what() == entry.kind.word()));
+                file.rows = notes.map(|notes| notes.rows() as usize);
+            }
+        }
+        RunOutputs::new(provenance, &self.backtest, record)
     }
 }
 
@@ -105,7 +126,7 @@ fn own_document(run: &RunFile) -> Result<InputFile, InputError> {
 }
 
 /// The execution plant with the mechanisms of `run`.
-fn venue(run: &RunFile) -> Result<Assembly<Execution>, InputError> {
+pub(super) fn venue(run: &RunFile) -> Result<Assembly<Execution>, InputError> {
     let mut venue = Assembly::new(Execution, MECHANISMS);
     for (index, entry) in run.mechanisms.iter().enumerate() {
         let (mechanism, form, parameters) = listed_mechanism(run.document(), index, entry, &Execution, MECHANISMS)?;
@@ -118,7 +139,7 @@ fn venue(run: &RunFile) -> Result<Assembly<Execution>, InputError> {
 fn history(entry: &DataEntry) -> Result<History, InputError> {
     match entry.kind {
         FeedKind::Bars => History::read_bars(&entry.path, &entry.format, entry.interval),
-        FeedKind::Quotes => History::read_quotes(&entry.path, &entry.format),
+        FeedKind::Quotes => History::read_quote_bars(&entry.path, &entry.format, entry.interval),
         FeedKind::Trades => History::read_trades(&entry.path, &entry.format),
         FeedKind::Book if entry.format.layout.tells_orders() => History::read_order_events(&entry.path, &entry.format),
         FeedKind::Book => History::read_depth(&entry.path, &entry.format),
@@ -133,22 +154,30 @@ fn joined(run: &RunFile, index: usize, symbol: &str, read: &mut [Option<History>
     };
     let kinds = [FeedKind::Bars, FeedKind::Quotes, FeedKind::Trades, FeedKind::Book];
     let Some(whole) = kinds.into_iter().filter_map(&mut take).reduce(History::joined_with) else {
-        let error = run.error(&["instrument", &index.to_string()], format!("there are no data of `{symbol}`"));
-        return Err(error.hint("add [[data]] with its symbol and bars, quotes, trades or book, or drop the instrument"));
+        return Err(no_data(run, index, symbol));
     };
-    let (start, end) = (run.run.start, run.run.end);
-    if start.is_none() && end.is_none() {
-        return Ok(whole);
-    }
-    // A run's end is the first instant that no longer counts.
-    let last = end.map_or(Timestamp::MAX, |end| Timestamp(end.0.saturating_sub(1)));
-    let within = whole.within(start.unwrap_or(Timestamp::MIN), last);
+    let Some((start, last)) = span(run) else { return Ok(whole) };
+    let within = whole.within(start, last);
     if within.is_empty() {
-        let key = if start.is_some() { "start" } else { "end" };
+        let key = if run.run.start.is_some() { "start" } else { "end" };
         let error = run.error(&["run", key], format!("there are no data of `{symbol}` between `start` and `end`"));
         return Err(error.hint("leave them out to run on all data; times without a zone in files are UTC unless declared"));
     }
     Ok(within)
+}
+
+/// The error about an instrument without data.
+pub(super) fn no_data(run: &RunFile, index: usize, symbol: &str) -> InputError {
+    let error = run.error(&["instrument", &index.to_string()], format!("there are no data of `{symbol}`"));
+    error.hint("add [[data]] with its symbol and bars, quotes, trades or book, or drop the instrument")
+}
+
+/// The first and the last instant whose data count; none where all do.
+pub(super) fn span(run: &RunFile) -> Option<(Timestamp, Timestamp)> {
+    let (start, end) = (run.run.start, run.run.end);
+    // A run's end is the first instant that no longer counts.
+    let last = end.map_or(Timestamp::MAX, |end| Timestamp(end.0.saturating_sub(1)));
+    (start.is_some() || end.is_some()).then_some((start.unwrap_or(Timestamp::MIN), last))
 }
 
 /// What `[run] price` asks for, as far as the data have it.
@@ -178,11 +207,17 @@ fn reference(run: &RunFile, histories: &[History]) -> Result<Option<Reference>, 
 /// runs.
 #[must_use]
 pub fn explained(run: &RunFile, error: &BacktestError) -> InputError {
+    if let BacktestError::Data(error) = error
+        && let StreamError::Input(error) = &**error
+    {
+        return error.clone();
+    }
     let keys: &[&str] = match error {
         BacktestError::Leverage(_) => &["run", "max_leverage"],
         BacktestError::ModelPrice { .. } => &["mechanism"],
         BacktestError::Latency(_) => &["latency"],
         BacktestError::Queue(_) => &["matching", "queue"],
+        BacktestError::EquityEvery(_) => &["run", "equity_every"],
         _ => &["run"],
     };
     split(run, keys, &error.to_string())

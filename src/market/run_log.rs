@@ -8,7 +8,7 @@ use crate::report::{BacktestPage, ReportError};
 
 use super::metric::{Counts, InstrumentSummary, Metrics, RoundTrip};
 use super::run_page::run_page;
-use super::{Backtest, Instrument, MoneyError, Price, Record, Reference};
+use super::{Backtest, DataSummary, Instrument, MoneyError, Price, Record, Reference};
 
 /// A file a run depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -61,6 +61,8 @@ pub struct RunSummary {
     pub counts: Counts,
     /// Instrument by instrument.
     pub instruments: Vec<InstrumentSummary>,
+    /// What was found in the data, file by file.
+    pub data: Vec<DataSummary>,
 }
 
 impl RunSummary {
@@ -78,6 +80,7 @@ impl RunSummary {
             metrics: Metrics::of(record)?,
             counts: Counts::of(record),
             instruments: InstrumentSummary::of(record, instruments),
+            data: DataSummary::of(record, instruments),
         })
     }
 }

@@ -8,7 +8,7 @@ use crate::sim2real::{Parameter, Simulator, Timestamp};
 
 use super::metric::{Drawdown, Metrics, Month, RoundTrip};
 use super::run_figures::{figure_groups, key_figures};
-use super::{Backtest, EquityPoint, Record, Reference, RunSummary};
+use super::{Backtest, DataSeen, EquityPoint, Record, Reference, RunSummary};
 
 /// Fills a page is given: it lists no more.
 const FILLS: usize = 200;
@@ -30,7 +30,7 @@ pub(super) fn run_page(summary: &RunSummary, backtest: &Backtest, record: &Recor
         fills: record.blotter.fills.iter().take(FILLS).map(|fill| shown(backtest, fill)).collect(),
         fill_count: record.blotter.fills.len(),
         costs: costs(&summary.metrics),
-        in_force: in_force(summary, backtest),
+        in_force: in_force(summary, backtest, &record.data),
         inputs: inputs(summary),
     }
 }
@@ -140,12 +140,12 @@ fn costs(metrics: &Metrics) -> Vec<Cost> {
 }
 
 /// How orders that wait were matched, and how long messages took: where it can have mattered.
-fn matched(summary: &RunSummary, backtest: &Backtest) -> Vec<(&'static str, String)> {
+fn matched(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec<(&'static str, String)> {
     let settings = backtest.settings();
     let (matching, latencies) = (settings.matching, &settings.latencies);
     let mut all = Vec::new();
     if summary.counts.resting > 0 {
-        let by_bars = backtest.histories().iter().any(|history| history.shows_bars_alone());
+        let by_bars = data.iter().any(|seen| seen.bars_alone);
         if by_bars {
             let count = match summary.counts.ambiguous_bars {
                 0 => "in no bar did it decide what was filled".to_owned(),
@@ -171,7 +171,7 @@ fn matched(summary: &RunSummary, backtest: &Backtest) -> Vec<(&'static str, Stri
     all
 }
 
-fn in_force(summary: &RunSummary, backtest: &Backtest) -> Vec<InForce> {
+fn in_force(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec<InForce> {
     let venue = backtest.venue();
     let currency = &summary.provenance.currency;
     let setting = |p: &Parameter| {
@@ -185,22 +185,24 @@ fn in_force(summary: &RunSummary, backtest: &Backtest) -> Vec<InForce> {
         setting: parameters.iter().map(setting).collect::<Vec<_>>().join(", "),
     };
     let mut all: Vec<InForce> = venue.mechanisms().map(|(row, _, p)| mechanism(row.about().name, p)).collect();
-    let histories = backtest.histories();
-    let quoted = histories.iter().filter(|history| !history.quotes().is_empty()).count();
+    let quoted = data.iter().filter(|seen| seen.quoted).count();
     let from_quotes = match summary.provenance.reference {
         Reference::Mid => "from the mid of the quotes an order meets",
         Reference::Touch => "at the best price of the quotes an order meets",
     };
     let fills = match quoted {
         0 => "at the open of the next bar".to_owned(),
-        all if all == histories.len() => from_quotes.to_owned(),
+        all if all == data.len() => from_quotes.to_owned(),
         _ => format!("{from_quotes}; without quotes at the open of the next bar"),
     };
     let assumption = |name: &str, setting: String| InForce { name: name.to_owned(), setting };
     all.push(assumption("market orders", fills));
-    all.extend(matched(summary, backtest).into_iter().map(|(name, setting)| assumption(name, setting)));
+    all.extend(matched(summary, backtest, data).into_iter().map(|(name, setting)| assumption(name, setting)));
     all.push(assumption("largest leverage", format!("{} times the equity", number(backtest.settings().max_leverage))));
     all.push(assumption("market", "the past does not react to what the backtest trades".to_owned()));
+    for file in &summary.data {
+        all.extend(file.lines.iter().map(|line| assumption("data", format!("{}, {line}", file.symbol))));
+    }
     match summary.metrics.returns.gaps {
         0 => {}
         gaps => all.push(assumption(

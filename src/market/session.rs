@@ -6,17 +6,19 @@ use std::fmt;
 use crate::sim2real::Timestamp;
 
 use super::agenda::{Agenda, Due, Phase};
-use super::backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
+use super::backtest::{Backtest, BacktestError, Held, Record, Settings};
 use super::blotter::Blotter;
 use super::carry::Carry;
+use super::equity_curve::EquityCurve;
 use super::known::Known;
 use super::latency::Clocks;
+use super::line::{Line, RowKind};
 use super::mail::Mail;
 use super::transit::Transit;
 use super::venue::{Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{
-    Arrival, Cash, Daily, DepthBook, Event, EventKind, Feed, History, Ledger, MoneyError, OrderId, Orders, Price, Reference,
-    Strategy, View,
+    Arrival, Cash, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, MoneyError, OrderId, Orders, Price,
+    Reference, Strategy, View,
 };
 
 /// A backtest under way.
@@ -24,6 +26,8 @@ pub struct Session<'d> {
     pub(super) setup: &'d Backtest,
     feed: Feed<'d>,
     transit: Transit,
+    /// Trades value what is held: there is nothing else that could.
+    trades_mark: Vec<bool>,
     /// Data take no time to the strategy but what their own two times say.
     direct: bool,
     pub(super) agenda: Agenda,
@@ -45,7 +49,7 @@ pub struct Session<'d> {
     pub(super) carry: Carry,
     pub(super) orders: Orders,
     pub(super) blotter: Blotter,
-    equity: Vec<EquityPoint>,
+    pub(super) equity: EquityCurve,
     held: Held,
     rows: usize,
 }
@@ -56,13 +60,13 @@ impl fmt::Debug for Session<'_> {
     }
 }
 
-/// How finely a history knows its market.
-fn detail(history: &History) -> Detail {
-    if !history.order_events().is_empty() {
+/// How finely the data of an instrument know its market.
+fn detail(line: &Line<'_>) -> Detail {
+    if line.tells(RowKind::Orders) {
         Detail::ByOrder
-    } else if !history.depth().is_empty() {
+    } else if line.tells(RowKind::Depth) {
         Detail::ByPrice
-    } else if !history.quotes().is_empty() || !history.prints().is_empty() {
+    } else if line.tells(RowKind::Quotes) || line.tells(RowKind::Trades) {
         Detail::Quotes
     } else {
         Detail::Bars
@@ -70,25 +74,26 @@ fn detail(history: &History) -> Detail {
 }
 
 impl<'d> Session<'d> {
-    pub(super) fn new(setup: &'d Backtest) -> Self {
-        let feed = Feed::new(&setup.histories);
-        let Settings { cash, seed, reference, matching, latencies, .. } = setup.settings.clone();
+    pub(super) fn new(setup: &'d Backtest, feed: Feed<'d>) -> Self {
+        let Settings { cash, seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
         let origin = feed.peek().unwrap_or_default();
         let (intrabar, limit_fill, queue) = (matching.intrabar, matching.limit_fill, matching.queue);
-        let depth: Vec<Detail> = setup.histories.iter().map(detail).collect();
+        let depth: Vec<Detail> = feed.lines().iter().map(detail).collect();
         let known = |(k, detail): (usize, &Detail)| Known {
             book: matches!(detail, Detail::ByPrice | Detail::ByOrder).then(|| DepthBook::new(setup.increments[k])),
             ..Known::default()
         };
         let known = depth.iter().enumerate().map(known).collect();
-        let data_of = setup.histories.iter().zip(&depth).map(|(history, detail)| match detail {
+        let data_of = feed.lines().iter().zip(&depth).map(|(line, detail)| match detail {
             Detail::Bars => EventKind::Bar,
-            Detail::Quotes if history.quotes().is_empty() => EventKind::Trade,
+            Detail::Quotes if !line.tells(RowKind::Quotes) => EventKind::Trade,
             Detail::Quotes => EventKind::Quote,
             Detail::ByPrice | Detail::ByOrder => EventKind::Depth,
         });
         let data_of = data_of.collect();
+        let finer = [RowKind::Bars, RowKind::Depth, RowKind::Orders, RowKind::Quotes];
+        let trades_mark = feed.lines().iter().map(|line| !finer.iter().any(|kind| line.tells(*kind))).collect();
         let venue = Setup {
             symbols: setup.instruments.iter().map(|i| i.symbol.as_str()).collect(),
             increments: &setup.increments,
@@ -101,8 +106,9 @@ impl<'d> Session<'d> {
         let count = setup.instruments.len();
         Self {
             setup,
-            equity: Vec::with_capacity(feed.events() + 1),
+            equity: EquityCurve::new(equity_every, feed.rows()),
             feed,
+            trades_mark,
             transit: Transit::new(count),
             agenda: Agenda::default(),
             direct: latencies.feed.is_none(),
@@ -125,10 +131,50 @@ impl<'d> Session<'d> {
         }
     }
 
-    /// Rows of data read, and rows in all.
+    /// Rows of data read, and rows in all, where all are in memory.
     #[must_use]
-    pub fn progress(&self) -> (usize, usize) {
-        (self.rows, self.feed.events())
+    pub fn progress(&self) -> (usize, Option<usize>) {
+        (self.rows, self.feed.rows())
+    }
+
+    /// Events the strategy has seen.
+    #[must_use]
+    pub fn events(&self) -> usize {
+        self.held.events
+    }
+
+    /// When the strategy sees the next event, or something else happens; none when the data have ended.
+    pub(super) fn next_time(&self) -> Option<Timestamp> {
+        self.feed.peek().into_iter().chain(self.transit.peek()).min()
+    }
+
+    /// The same once more, where its data are in memory.
+    pub(super) fn copied(&self) -> Option<Self> {
+        Some(Self {
+            setup: self.setup,
+            feed: self.feed.forked()?,
+            transit: self.transit.clone(),
+            trades_mark: self.trades_mark.clone(),
+            direct: self.direct,
+            agenda: self.agenda.clone(),
+            clocks: self.clocks.clone(),
+            known: self.known.clone(),
+            daily: self.daily.clone(),
+            venue: self.venue.clone(),
+            data_of: self.data_of.clone(),
+            sent: self.sent.clone(),
+            mail: self.mail.clone(),
+            outcomes: self.outcomes.clone(),
+            terms: self.terms.clone(),
+            expected: self.expected.clone(),
+            ledger: self.ledger.clone(),
+            carry: self.carry.clone(),
+            orders: self.orders.clone(),
+            blotter: self.blotter.clone(),
+            equity: self.equity.clone(),
+            held: self.held,
+            rows: self.rows,
+        })
     }
 
     /// Lets the next event happen that the strategy sees, after all that happens before it; none when the data have ended.
@@ -155,6 +201,9 @@ impl<'d> Session<'d> {
             if data == Some(next) {
                 let Some(arrival) = self.feed.next() else { return Ok(None) };
                 self.rows += arrival.end - arrival.row;
+                if self.feed.is_low() {
+                    self.read_on(&arrival)?;
+                }
                 self.happen(&arrival)?;
                 if self.direct && arrival.known_at <= next {
                     return self.show(&arrival, strategy).map(Some);
@@ -172,7 +221,7 @@ impl<'d> Session<'d> {
     /// # Errors
     /// As [`Backtest::run`].
     pub fn finish(mut self) -> Result<Record, BacktestError> {
-        let end = self.equity.last().map_or(Timestamp::MIN, |point| point.time);
+        let end = self.equity.end().unwrap_or(Timestamp::MIN);
         let fills = self.blotter.fills.len();
         while self.agenda.peek().is_some_and(|(at, _)| at <= end) || !self.mail.is_empty() {
             let Some((at, due)) = self.agenda.pop() else { break };
@@ -186,10 +235,18 @@ impl<'d> Session<'d> {
         self.charge_all(end)?;
         if self.blotter.fills.len() > fills || self.ledger.cash() != cash {
             let equity = self.ledger.equity().map_err(|error| BacktestError::Money { place: "the end".into(), error })?;
-            self.equity.push(EquityPoint { time: end, equity: equity.to_f64() });
+            self.equity.push(end, equity.to_f64());
         }
         self.held.ambiguous_bars = self.venue.floors.iter().map(|floor| floor.ambiguous_bars()).sum();
-        Ok(Record { blotter: self.blotter, equity: self.equity, ledger: self.ledger, held: self.held })
+        let data = self.feed.lines().iter().map(DataSeen::of).collect();
+        Ok(Record { blotter: self.blotter, equity: self.equity.finish(), ledger: self.ledger, held: self.held, data })
+    }
+
+    /// Reads on in the data of which `arrival` came last; what is on its way to the strategy stays at hand, and the row before.
+    #[cold]
+    fn read_on(&mut self, arrival: &Arrival) -> Result<(), BacktestError> {
+        let oldest = self.transit.oldest(&arrival.event).map_or(arrival.row, |row| row.min(arrival.row));
+        self.feed.read_on(oldest.saturating_sub(1)).map_err(|error| BacktestError::Data(Box::new(error)))
     }
 
     /// What is due next happens: the event it makes for the strategy, if it asked to be woken.
@@ -222,34 +279,35 @@ impl<'d> Session<'d> {
     #[inline(always)]
     fn happen(&mut self, arrival: &Arrival) -> Result<(), BacktestError> {
         let Event { time, instrument, kind } = arrival.event;
-        let history = &self.setup.histories[instrument];
+        let line = self.feed.line(instrument);
         let floor = &mut self.venue.floors[instrument];
         match kind {
             EventKind::Bar => {
-                if floor.by_bars() && !floor.is_idle() {
-                    let bars = history.bars();
-                    let bar = &bars[arrival.row];
+                if let Some(bar) = line.bar(arrival.row).filter(|_| floor.by_bars() && !floor.is_idle()) {
                     floor.at_row(0, arrival.row);
-                    floor.on_bar(bar, ends_day(bars.get(arrival.row + 1).map(|next| next.open_at), bar.open_at));
+                    floor.on_bar(bar, ends_day(line.bar(arrival.row + 1).map(|next| next.open_at), bar.open_at));
                     self.expect_open(instrument);
                 }
             }
             EventKind::Quote => {
                 floor.at_row(1, arrival.row);
-                if let Some(quote) = history.quotes().all().get(arrival.row) {
+                if let Some(quote) = line.quote(arrival.row) {
                     floor.on_quote(&quote, time);
                 }
             }
             EventKind::Trade => {
                 floor.at_row(2, arrival.row);
-                floor.on_print(&history.prints()[arrival.row], time);
+                if let Some(print) = line.print(arrival.row) {
+                    floor.on_print(print, time);
+                }
             }
             EventKind::Depth => {
                 floor.at_row(3, arrival.row);
-                if history.order_events().is_empty() {
-                    history.depth()[arrival.row..arrival.end].iter().for_each(|change| floor.on_depth(change));
+                let rows = arrival.row..arrival.end;
+                if line.tells(RowKind::Orders) {
+                    line.order_events(rows).iter().for_each(|event| floor.on_order(event));
                 } else {
-                    history.order_events()[arrival.row..arrival.end].iter().for_each(|event| floor.on_order(event));
+                    line.depth(rows).iter().for_each(|change| floor.on_depth(change));
                 }
                 floor.look(time);
             }
@@ -265,7 +323,7 @@ impl<'d> Session<'d> {
             return;
         }
         let Some(row) = self.feed.next_bar(instrument).filter(|row| self.expected[instrument] != Some(*row)) else { return };
-        let Some(bar) = self.setup.histories[instrument].bars().get(row) else { return };
+        let Some(bar) = self.feed.line(instrument).bar(row) else { return };
         if floor.awaits_open(bar.open_at) {
             self.expected[instrument] = Some(row);
             self.agenda.put(bar.open_at, Phase::Opens, Due::Open(instrument));
@@ -275,11 +333,12 @@ impl<'d> Session<'d> {
     /// The next bar of an instrument opens.
     pub(super) fn open_bar(&mut self, instrument: usize) {
         let Some(row) = self.expected[instrument] else { return };
-        let bars = self.setup.histories[instrument].bars();
-        let first = ends_day(Some(bars[row].open_at), row.checked_sub(1).map_or(Timestamp::MIN, |k| bars[k].open_at));
+        let line = self.feed.line(instrument);
+        let Some(bar) = line.bar(row) else { return };
+        let before = row.checked_sub(1).and_then(|k| line.bar(k)).map_or(Timestamp::MIN, |before| before.open_at);
         let floor = &mut self.venue.floors[instrument];
         floor.at_row(0, row);
-        floor.on_open(&bars[row], first);
+        floor.on_open(bar, ends_day(Some(bar.open_at), before));
     }
 
     /// Shows the strategy what became known, and sends what it asks for.
@@ -325,27 +384,28 @@ impl<'d> Session<'d> {
     #[inline(always)]
     fn learn(&mut self, arrival: &Arrival, keep: usize) -> Result<(), MoneyError> {
         let Event { time, instrument, kind } = arrival.event;
-        let (history, known) = (&self.setup.histories[instrument], &mut self.known[instrument]);
+        let (line, known) = (self.feed.line(instrument), &mut self.known[instrument]);
         known.keep = keep;
         let (price, volume) = match kind {
             EventKind::Bar => {
-                let bar = history.bars()[arrival.row];
-                known.bars.push(bar, keep);
+                let Some(bar) = line.bar(arrival.row) else { return Ok(()) };
+                known.bars.push(*bar, keep);
                 (Some(bar.close), bar.volume)
             }
             EventKind::Quote => {
-                known.quotes.push(history.quotes(), arrival.row, keep);
+                let (quotes, place) = line.quotes(arrival.row);
+                known.quotes.push(quotes, place, keep);
                 // A quote with an empty side has no mid; the last one stands.
                 let mid = known.quotes.newest(1).last().and_then(|quote| quote.mid());
                 (mid.map(Price::nearest).transpose()?, 0.0)
             }
             EventKind::Trade => {
-                let print = history.prints()[arrival.row];
-                known.prints.push(print, keep);
-                let alone = history.quotes().is_empty() && known.book.is_none() && history.bars().is_empty();
-                (if alone { Some(Price::nearest(print.price)?) } else { None }, print.size)
+                let Some(print) = line.print(arrival.row) else { return Ok(()) };
+                known.prints.push(*print, keep);
+                let marks = self.trades_mark[instrument];
+                (if marks { Some(Price::nearest(print.price)?) } else { None }, print.size)
             }
-            EventKind::Depth => (known.learn_depth(history, arrival), 0.0),
+            EventKind::Depth => (known.learn_depth(line, arrival), 0.0),
             EventKind::Timer => (None, 0.0),
         };
         let Some(price) = price else { return Ok(()) };
@@ -367,7 +427,7 @@ impl<'d> Session<'d> {
                 self.held.leverage += self.ledger.gross() / equity;
             }
         }
-        self.equity.push(EquityPoint { time, equity });
+        self.equity.push(time, equity);
     }
 
     fn money(&self, event: Event, error: MoneyError) -> BacktestError {

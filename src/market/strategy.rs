@@ -332,4 +332,8 @@ pub trait Strategy: Send {
     fn on_event(&mut self, view: &View<'_>, orders: &mut Orders);
     /// Learns what became of one of its orders, and may ask for more.
     fn on_notice(&mut self, _view: &View<'_>, _notice: &Notice, _orders: &mut Orders) {}
+    /// The same with all it remembers, for a run that is forked; none where it cannot be copied: such a run is repeated.
+    fn copied(&self) -> Option<Box<dyn Strategy>> {
+        None
+    }
 }

@@ -3,6 +3,8 @@
 #[cfg(feature = "io")]
 mod bar_rows;
 #[cfg(feature = "io")]
+mod between;
+#[cfg(feature = "io")]
 mod binance_depth;
 #[cfg(feature = "io")]
 mod bitstamp;
@@ -30,10 +32,12 @@ mod stored;
 
 use crate::sim2real::Timestamp;
 
-use super::{Bar, Book, DepthChange, HistoryError, OrderEvent, Print};
+use super::{Bar, Book, DataNotes, DepthChange, HistoryError, OrderEvent, Print};
 
 #[cfg(feature = "io")]
 pub(super) use bar_rows::BarRows;
+#[cfg(feature = "io")]
+pub(super) use between::Between;
 #[cfg(feature = "io")]
 pub use file_stream::FileStream;
 #[cfg(feature = "io")]
@@ -52,6 +56,11 @@ pub trait Stream<T: Dated>: Send {
     /// # Errors
     /// Data that cannot be read or cannot be.
     fn refill(&mut self, into: &mut Vec<T>) -> Result<bool, StreamError>;
+
+    /// What was found in its rows so far, where it keeps count of that.
+    fn notes(&self) -> Option<&DataNotes> {
+        None
+    }
 }
 
 /// What carries the two times of the market.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::sim2real::Timestamp;
 
-use super::{Arrival, EventKind};
+use super::{Arrival, Event, EventKind};
 
 /// Data on their way, in the order in which they will be known. What comes by one line does not overtake: rows of one kind of one
 /// instrument arrive in their order.
@@ -31,6 +31,12 @@ impl Transit {
 
     pub fn pop(&mut self) -> Option<(Timestamp, Arrival)> {
         self.way.pop_front()
+    }
+
+    /// The oldest row on its way of those of the kind and instrument of `event`.
+    pub fn oldest(&self, event: &Event) -> Option<usize> {
+        let same = |other: &Event| (other.instrument, other.kind) == (event.instrument, event.kind);
+        self.way.iter().find(|(_, arrival)| same(&arrival.event)).map(|(_, arrival)| arrival.row)
     }
 
     /// Puts data on their way that would be known at `at` if nothing were ahead of them.

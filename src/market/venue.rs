@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
 
-use super::{Book, DepthBook, Execution, Increments, Quantity, Side};
+use super::{AnotherFill, Book, DepthBook, Execution, Increments, Quantity, Side};
 
 pub use path::Intrabar;
 pub use queue::QueueModel;
@@ -96,6 +96,7 @@ pub struct Matching {
 }
 
 /// The floors of all instruments, and what their laws are called.
+#[derive(Clone)]
 pub(super) struct Venue {
     pub floors: Vec<Floor>,
     /// Ids of the mechanisms that act on prices, in their order.
@@ -170,6 +171,12 @@ impl Floor {
             }
         }
         self.sweep(at);
+    }
+
+    /// The next fill of an order is to be another.
+    pub fn fill_instead(&mut self, id: super::OrderId, instead: AnotherFill) {
+        self.instead.retain(|(other, _)| *other != id);
+        self.instead.push((id, instead));
     }
 
     /// How far bars left open what was filled.

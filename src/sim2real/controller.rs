@@ -1,5 +1,6 @@
 //! What closes a loop: real servos are recorded with a controller running, and the command that is recorded is its set point.
 
+use dyn_clone::DynClone;
 use serde::{Deserialize, Serialize};
 
 use super::{Observation, Parameter, Plant, Recording, Stimulus, Thetas};
@@ -25,7 +26,7 @@ pub trait Controller<P: Plant>: Send + Sync {
 ///
 /// # Contract
 /// What it gives at a time depends on what it was shown up to that time, lane by lane.
-pub trait Feedback<P: Plant>: Send {
+pub trait Feedback<P: Plant>: DynClone + Send {
     /// Whether it acts at `time` [s]; else it gives what it gave before.
     fn due(&self, time: f64) -> bool;
     /// Replaces set points by what it gives at `time` [s] on seeing `observations`; one of each a lane.
@@ -35,6 +36,8 @@ pub trait Feedback<P: Plant>: Send {
     /// All lanes go on from what the first remembers.
     fn rejoin(&mut self);
 }
+
+dyn_clone::clone_trait_object!(<P: Plant> Feedback<P>);
 
 /// What a controller's derivative is taken of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -125,6 +128,7 @@ where
 }
 
 /// A running PID controller.
+#[derive(Clone)]
 struct Loops {
     lanes: Vec<Loop>,
     period: Option<f64>,

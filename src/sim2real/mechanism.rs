@@ -25,6 +25,7 @@ mod wire;
 
 use std::fmt;
 
+use dyn_clone::DynClone;
 use serde::{Deserialize, Serialize};
 
 use super::{Parameter, Plant, Seed, Thetas, Tick, Typical};
@@ -187,7 +188,9 @@ pub struct Scene<'a, P: Plant> {
 }
 
 /// The running part of a mechanism over all lanes, and the owner of its memory. It acts through one of its methods.
-pub trait Law<P: Plant>: Send {
+///
+/// A copy goes on from the same memory by itself: so a run can be forked.
+pub trait Law<P: Plant>: DynClone + Send {
     /// Shapes the commands on their way to the plant, one a lane.
     fn shape(&mut self, _tick: Tick, _commands: &mut [P::Command]) {}
     /// Adds to what acts inside the plant, one effect a lane.
@@ -195,3 +198,5 @@ pub trait Law<P: Plant>: Send {
     /// Distorts the observations on their way back, one a lane.
     fn sense(&mut self, _time: f64, _observations: &mut [P::Observation]) {}
 }
+
+dyn_clone::clone_trait_object!(<P: Plant> Law<P>);

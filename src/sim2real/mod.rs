@@ -30,6 +30,6 @@ pub use plant::{Channel, Clock, Command, Covariate, DelayLine, Dynamics, Observa
 pub use recording::{Measured, Part, Recording, Simulated, Trajectory};
 pub use residual::ChannelWeight;
 pub use run::Run;
-pub use seed::Seed;
+pub use seed::{Draws, Seed};
 pub use simulator::{Candidate, Simulator, Twin};
 pub use time::{Tick, Timestamp, written_instant};

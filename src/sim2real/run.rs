@@ -18,6 +18,28 @@ pub struct Run<P: Plant> {
     pub(super) observations: Vec<P::Observation>,
 }
 
+impl<P: Plant> Clone for Run<P>
+where
+    P::Dynamics: Clone,
+{
+    fn clone(&self) -> Self {
+        let Self { controller, dynamics, command_laws, plant_laws, observation_laws, .. } = self;
+        let Self { states, effects, commands, inputs, observations, .. } = self;
+        Self {
+            controller: controller.clone(),
+            dynamics: dynamics.clone(),
+            command_laws: command_laws.clone(),
+            plant_laws: plant_laws.clone(),
+            observation_laws: observation_laws.clone(),
+            states: states.clone(),
+            effects: effects.clone(),
+            commands: commands.clone(),
+            inputs: inputs.clone(),
+            observations: observations.clone(),
+        }
+    }
+}
+
 impl<P: Plant> fmt::Debug for Run<P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Run").field("lanes", &self.states.len()).finish_non_exhaustive()

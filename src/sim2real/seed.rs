@@ -1,5 +1,7 @@
 //! Randomness from named streams: same seed and name, same bits, whatever else was drawn.
 
+use std::ops::{Deref, DerefMut};
+
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use sha2::{Digest, Sha256};
@@ -14,16 +16,43 @@ pub struct Seed(pub u64);
 impl Seed {
     /// The generator of the stream called `name`.
     #[must_use]
-    pub fn stream(self, name: &str) -> ChaCha8Rng {
+    pub fn stream(self, name: &str) -> Draws {
         let mut rng = ChaCha8Rng::seed_from_u64(self.0);
         rng.set_stream(hash(name));
-        rng
+        Draws(rng)
     }
 
     /// A seed for a part of a run, itself a source of named streams.
     #[must_use]
     pub fn child(self, name: &str) -> Self {
         Self(self.0.rotate_left(17) ^ hash(name))
+    }
+}
+
+/// The draws of a named stream. A copy draws the same from here on, by itself: so a run can be forked.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Draws(ChaCha8Rng);
+
+impl Clone for Draws {
+    fn clone(&self) -> Self {
+        let mut copy = ChaCha8Rng::from_seed(self.0.get_seed());
+        copy.set_stream(self.0.get_stream());
+        copy.set_word_pos(self.0.get_word_pos());
+        Self(copy)
+    }
+}
+
+impl Deref for Draws {
+    type Target = ChaCha8Rng;
+
+    fn deref(&self) -> &ChaCha8Rng {
+        &self.0
+    }
+}
+
+impl DerefMut for Draws {
+    fn deref_mut(&mut self) -> &mut ChaCha8Rng {
+        &mut self.0
     }
 }
 
@@ -58,5 +87,21 @@ mod tests {
             (0..3).map(|_| rng.next_u64()).collect()
         };
         insta::assert_debug_snapshot!(draws);
+    }
+
+    #[test]
+    fn a_copy_draws_the_same_from_any_place() {
+        let mut draws = Seed(3).stream("noise");
+        for k in 0..200 {
+            // Words of 32 bits, too: a place may lie within a block.
+            if k % 3 == 0 {
+                draws.next_u32();
+            }
+            let mut copy = draws.clone();
+            let expected: Vec<u64> = (0..20).map(|_| copy.next_u64()).collect();
+            let mut again = draws.clone();
+            assert_eq!((0..20).map(|_| again.next_u64()).collect::<Vec<_>>(), expected);
+            assert_eq!(draws.next_u64(), expected[0]);
+        }
     }
 }

@@ -4,10 +4,9 @@
 //! orders, cancellations and market orders. Added here: a hidden value that wanders, and hours that are busy or quiet.
 
 use rand::RngExt;
-use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, Exp1, StandardNormal};
 
-use crate::sim2real::Seed;
+use crate::sim2real::{Draws, Seed};
 
 use super::order_book::{Match, OrderBook, Side};
 
@@ -87,7 +86,7 @@ struct Posted {
 /// The crowd.
 #[derive(Debug)]
 pub(super) struct Agents {
-    rng: ChaCha8Rng,
+    rng: Draws,
     posted: Vec<Posted>,
     next: u64,
 }

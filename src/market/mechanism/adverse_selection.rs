@@ -43,6 +43,7 @@ impl Mechanism<Execution> for AdverseSelection {
     }
 }
 
+#[derive(Clone)]
 struct Markout {
     bps: Vec<f64>,
 }

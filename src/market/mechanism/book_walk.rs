@@ -49,6 +49,7 @@ impl Demanding for BookWalk {
     }
 }
 
+#[derive(Clone)]
 struct Walk {
     fraction: Vec<f64>,
 }

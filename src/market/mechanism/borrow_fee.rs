@@ -43,6 +43,7 @@ impl Mechanism<Execution> for BorrowFee {
     }
 }
 
+#[derive(Clone)]
 struct Loan {
     annual_rate: Vec<f64>,
 }

@@ -111,6 +111,7 @@ impl Schedule {
     }
 }
 
+#[derive(Clone)]
 struct Charge {
     schedules: Vec<Schedule>,
 }

@@ -51,6 +51,7 @@ impl Mechanism<Execution> for Funding {
     }
 }
 
+#[derive(Clone)]
 struct Transfer {
     rate: Vec<f64>,
     /// Time between two charges [s], where there is any.

@@ -57,6 +57,7 @@ impl Demanding for HalfSpread {
     }
 }
 
+#[derive(Clone)]
 struct Concession {
     of_spread: bool,
     size: Vec<f64>,

@@ -48,6 +48,7 @@ impl Demanding for LinearImpact {
     }
 }
 
+#[derive(Clone)]
 struct Impact {
     bps: Vec<f64>,
 }

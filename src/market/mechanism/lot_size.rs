@@ -41,6 +41,7 @@ impl Mechanism<Execution> for LotSize {
     }
 }
 
+#[derive(Clone)]
 struct Lots {
     lot: Vec<f64>,
 }

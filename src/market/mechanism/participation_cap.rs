@@ -49,6 +49,7 @@ impl Demanding for ParticipationCap {
     }
 }
 
+#[derive(Clone)]
 struct Cap {
     fraction: Vec<f64>,
 }

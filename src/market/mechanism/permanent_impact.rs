@@ -67,6 +67,7 @@ impl Demanding for PermanentImpact {
     }
 }
 
+#[derive(Clone)]
 struct Displaced {
     /// Mean displacement between two sums of what was traded, over that of a day's volume.
     mean: fn(f64, f64) -> f64,

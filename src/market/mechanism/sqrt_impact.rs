@@ -50,6 +50,7 @@ impl Demanding for SqrtImpact {
     }
 }
 
+#[derive(Clone)]
 struct Impact {
     bps: Vec<f64>,
 }

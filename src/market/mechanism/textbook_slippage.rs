@@ -1,10 +1,9 @@
 //! The formula most backtests charge for everything at once.
 
-use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::market::{Execution, ExecutionEffect};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Draws, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need};
 
@@ -71,16 +70,17 @@ impl Demanding for TextbookSlippage {
     }
 }
 
+#[derive(Clone)]
 struct Slippage {
     base_bps: Vec<f64>,
     volume_impact: Vec<f64>,
     noise_bps: Vec<f64>,
     /// Where the noise is drawn from, if there is any.
-    draws: Option<ChaCha8Rng>,
+    draws: Option<Draws>,
 }
 
 impl Slippage {
-    fn new(thetas: &Thetas, draws: Option<ChaCha8Rng>) -> Self {
+    fn new(thetas: &Thetas, draws: Option<Draws>) -> Self {
         let [base_bps, volume_impact, noise_bps] = [0, 1, 2].map(|k| thetas.row(k).to_vec());
         Self { base_bps, volume_impact, noise_bps, draws }
     }

@@ -86,6 +86,7 @@ impl Demanding for TransientImpact {
     }
 }
 
+#[derive(Clone)]
 struct Decaying {
     bps: Vec<f64>,
     /// What is left of own impact [bps].

@@ -59,6 +59,7 @@ impl Demanding for VolatilitySlippage {
     }
 }
 
+#[derive(Clone)]
 struct Slippage {
     daily: bool,
     fraction: Vec<f64>,

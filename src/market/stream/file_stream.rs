@@ -275,4 +275,8 @@ impl<T: Dated + Clone + PartialEq + Send> Stream<T> for FileStream<T> {
         }
         Ok(into.len() > before)
     }
+
+    fn notes(&self) -> Option<&DataNotes> {
+        Some(&self.rows.notes)
+    }
 }

@@ -1,7 +1,8 @@
 //! The floor on which one instrument is traded: the orders that wait there, and what fills them.
 
 use crate::market::{
-    Book, Condition, Execution, InFlight, Increments, Link, Met, OrderId, Price, Quantity, Reason, Reference, Role, Side,
+    AnotherFill, Book, Condition, Execution, InFlight, Increments, Link, Met, OrderId, Price, Quantity, Reason, Reference,
+    Role, Side,
 };
 use crate::sim2real::{Run, Tick, Timestamp};
 
@@ -38,6 +39,7 @@ pub(super) struct Offer {
 }
 
 /// The floor of one instrument.
+#[derive(Clone)]
 pub(in crate::market) struct Floor {
     pub(super) number: usize,
     pub(super) rules: Rules,
@@ -66,6 +68,8 @@ pub(in crate::market) struct Floor {
     pub(super) concessions: Vec<f64>,
     /// The same of each fill among the outcomes, in their order.
     pub(super) terms: Vec<f64>,
+    /// Fills that are to be others than they would be.
+    pub(super) instead: Vec<(OrderId, AnotherFill)>,
 }
 
 impl Floor {
@@ -96,6 +100,7 @@ impl Floor {
             outcomes: Vec::new(),
             concessions: vec![0.0; conceding],
             terms: Vec::new(),
+            instead: Vec::new(),
         }
     }
 
@@ -211,6 +216,10 @@ impl Floor {
 
     #[allow(clippy::too_many_arguments, reason = "they are the parts of one fill")]
     fn fill(&mut self, k: usize, role: Role, quantity: Quantity, price: Price, model_price: f64, fee: f64, offer: &Offer) {
+        let (quantity, price, model_price) = match self.another(k) {
+            Some((quantity, price)) => (quantity, price, price.to_f64()),
+            None => (quantity, price, model_price),
+        };
         let order = &mut self.resting[k];
         order.left = order.left - quantity;
         order.released = order.released - quantity;
@@ -232,6 +241,14 @@ impl Floor {
         self.terms.extend_from_slice(&self.concessions);
         self.tell(id, offer.at, What::Filled(filled));
         self.settle_links(id, link, quantity, offer.at);
+    }
+
+    /// What order `k` is to be filled with instead, if anything.
+    fn another(&mut self, k: usize) -> Option<(Quantity, Price)> {
+        let order = &self.resting[k];
+        let at = self.instead.iter().position(|(id, _)| *id == order.id)?;
+        let (_, AnotherFill { quantity, price }) = self.instead.swap_remove(at);
+        Some((quantity.unwrap_or(order.left).min(order.left), price))
     }
 
     pub(super) fn tell(&mut self, id: OrderId, at: Timestamp, what: What) {

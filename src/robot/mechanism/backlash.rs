@@ -81,6 +81,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Play {
     width: Vec<f64>,
     follower: Vec<Option<f64>>,
@@ -102,6 +103,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Gap {
     gap: Vec<f64>,
     share: Vec<f64>,

@@ -61,6 +61,7 @@ impl<P: Mover> Mechanism<P> for Cogging {
     }
 }
 
+#[derive(Clone)]
 struct Teeth {
     sine: Vec<f64>,
     cosine: Vec<f64>,

@@ -67,6 +67,7 @@ impl<P: Mover> Mechanism<P> for Compliance {
     }
 }
 
+#[derive(Clone)]
 struct Shaft {
     compliance: Vec<f64>,
     /// Of the inertia, that of the mass without an encoder.
@@ -148,6 +149,7 @@ fn twist(linear: f64, doubling: f64) -> f64 {
     })
 }
 
+#[derive(Clone)]
 struct OnMotor(Shaft);
 
 impl<P: Mover> Law<P> for OnMotor {
@@ -168,6 +170,7 @@ impl<P: Mover> Law<P> for OnMotor {
     }
 }
 
+#[derive(Clone)]
 struct OnLink(Shaft);
 
 impl<P: Mover> Law<P> for OnLink {

@@ -32,6 +32,7 @@ impl<P: Mover> Mechanism<P> for ConstantLoad {
     }
 }
 
+#[derive(Clone)]
 struct Load(Vec<f64>);
 
 impl<P: Mover> Law<P> for Load {

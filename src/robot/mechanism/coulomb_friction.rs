@@ -79,6 +79,7 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
     }
 }
 
+#[derive(Clone)]
 struct Dry(Vec<f64>);
 
 impl<P: Mover> Law<P> for Dry {
@@ -87,6 +88,7 @@ impl<P: Mover> Law<P> for Dry {
     }
 }
 
+#[derive(Clone)]
 struct Creeping(Vec<f64>);
 
 impl<P: Mover> Law<P> for Creeping {
@@ -95,6 +97,7 @@ impl<P: Mover> Law<P> for Creeping {
     }
 }
 
+#[derive(Clone)]
 struct Smooth {
     torque: Vec<f64>,
     velocity: Vec<f64>,

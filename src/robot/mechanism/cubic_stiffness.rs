@@ -34,6 +34,7 @@ impl<P: Mover> Mechanism<P> for CubicStiffness {
     }
 }
 
+#[derive(Clone)]
 struct Spring(Vec<f64>);
 
 impl<P: Mover> Law<P> for Spring {

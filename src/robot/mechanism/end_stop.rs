@@ -77,6 +77,7 @@ impl<P: Mover> Mechanism<P> for EndStop {
     }
 }
 
+#[derive(Clone)]
 struct Stops {
     lower: Vec<f64>,
     upper: Vec<f64>,

@@ -69,6 +69,7 @@ struct Drawn {
     level: f64,
 }
 
+#[derive(Clone)]
 struct Loops {
     torque: Vec<f64>,
     angle: Vec<f64>,
@@ -111,6 +112,7 @@ fn moved(level: f64, way: f64, loaded: impl Fn(f64, f64) -> f64) -> f64 {
     if further > 0.0 { way.signum() * loaded(level.abs(), further) } else { level }
 }
 
+#[derive(Clone)]
 struct Soft(Loops);
 
 impl<P: Mover> Law<P> for Soft {
@@ -120,6 +122,7 @@ impl<P: Mover> Law<P> for Soft {
     }
 }
 
+#[derive(Clone)]
 struct Sharp(Loops);
 
 /// `dw = (1 - w^2) dx`, exactly: `tanh(artanh(level) + way)`, by one exponential.

@@ -74,6 +74,7 @@ impl<P: Mover> Mechanism<P> for LoadFriction {
     }
 }
 
+#[derive(Clone)]
 struct Gears {
     torque: Vec<f64>,
     motor: Vec<f64>,
@@ -106,6 +107,7 @@ impl<P: Mover> Law<P> for Gears {
     }
 }
 
+#[derive(Clone)]
 struct StribeckGears {
     sliding: Gears,
     sticking: Gears,

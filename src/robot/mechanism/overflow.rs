@@ -57,6 +57,7 @@ impl Mechanism<Tanks> for Overflow {
     }
 }
 
+#[derive(Clone)]
 struct Full(Vec<Rims>);
 
 impl Law<Tanks> for Full {

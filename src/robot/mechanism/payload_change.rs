@@ -60,6 +60,7 @@ impl<P: Mover> Mechanism<P> for PayloadChange {
     }
 }
 
+#[derive(Clone)]
 struct Payload {
     time: Vec<f64>,
     inertia: Vec<f64>,

@@ -45,6 +45,7 @@ impl<P: Mover> Mechanism<P> for QuadraticDrag {
     }
 }
 
+#[derive(Clone)]
 struct Drag(Vec<f64>);
 
 impl<P: Mover> Law<P> for Drag {
@@ -55,6 +56,7 @@ impl<P: Mover> Law<P> for Drag {
     }
 }
 
+#[derive(Clone)]
 struct PowerDrag {
     coefficient: Vec<f64>,
     /// The power less 1.

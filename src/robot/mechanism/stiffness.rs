@@ -43,6 +43,7 @@ impl<P: Mover> Mechanism<P> for Stiffness {
     }
 }
 
+#[derive(Clone)]
 struct BentSpring {
     rates: Vec<f64>,
     thirds: Vec<f64>,
@@ -60,6 +61,7 @@ impl<P: Mover> Law<P> for BentSpring {
     }
 }
 
+#[derive(Clone)]
 struct Spring(Vec<f64>);
 
 impl<P: Mover> Law<P> for Spring {

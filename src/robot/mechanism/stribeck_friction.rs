@@ -55,6 +55,7 @@ impl<P: Mover> Mechanism<P> for StribeckFriction {
     }
 }
 
+#[derive(Clone)]
 struct Friction {
     torque: Vec<f64>,
     excess: Vec<f64>,
@@ -92,6 +93,7 @@ pub(super) fn falling(fall: f64, inertia: f64, step: f64) -> f64 {
     (0.5 * step * fall).min(0.25 * inertia)
 }
 
+#[derive(Clone)]
 struct Gaussian(Friction);
 
 impl<P: Mover> Law<P> for Gaussian {
@@ -103,6 +105,7 @@ impl<P: Mover> Law<P> for Gaussian {
     }
 }
 
+#[derive(Clone)]
 struct Tustin(Friction);
 
 impl<P: Mover> Law<P> for Tustin {

@@ -77,6 +77,7 @@ where
 }
 
 /// Two stages, of which the second follows the first.
+#[derive(Clone)]
 struct Stages {
     first: Lag,
     second: Lag,

@@ -34,6 +34,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Offset(Vec<f64>);
 
 impl<P: Plant> Law<P> for Offset

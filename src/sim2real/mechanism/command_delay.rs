@@ -47,6 +47,7 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
     }
 }
 
+#[derive(Clone)]
 struct Delay<P: Plant> {
     seconds: Vec<f64>,
     lines: Vec<<P::Command as Command>::Line>,

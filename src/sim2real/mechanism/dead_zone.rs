@@ -40,6 +40,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Width(Vec<f64>);
 
 impl<P: Plant> Law<P> for Width
@@ -56,6 +57,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct SoftWidth(Vec<f64>);
 
 impl<P: Plant> Law<P> for SoftWidth

@@ -69,6 +69,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Rate(Vec<f64>);
 
 impl<P: Plant> Law<P> for Rate
@@ -84,6 +85,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Settling {
     /// How much of it lies behind at the recording's beginning.
     share: Vec<f64>,

@@ -1,9 +1,8 @@
 //! A sensor whose samples are lost now and then.
 
 use rand::RngExt;
-use rand::rngs::ChaCha8Rng;
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Signs, Site, Thetas, Typical};
+use crate::sim2real::{About, Draws, Form, Law, Mechanism, Parameter, Plant, Seed, Signs, Site, Thetas, Typical};
 
 /// With `probability` a row repeats the row before, in all channels: a message was lost, and what reads the sensor holds
 /// the last. In the form `bursts`, losses begin with `probability` and last `length` rows in the mean, as of a bus that is
@@ -70,6 +69,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Losses<P: Plant> {
     /// Probability that a sample is lost after one that was not ...
     begins: Vec<f64>,
@@ -78,7 +78,7 @@ struct Losses<P: Plant> {
     lost: Vec<bool>,
     /// What was last reported; none before the first row, which is not lost.
     held: Vec<Option<P::Observation>>,
-    draws: ChaCha8Rng,
+    draws: Draws,
 }
 
 impl<P: Plant> Law<P> for Losses<P> {

@@ -55,6 +55,7 @@ where
 }
 
 /// Sine and cosine of the first harmonic, then of the second, one set a lane.
+#[derive(Clone)]
 struct Waves(Vec<[f64; 4]>);
 
 impl<P: Plant> Law<P> for Waves

@@ -44,6 +44,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Gains {
     positive: Vec<f64>,
     negative: Vec<f64>,

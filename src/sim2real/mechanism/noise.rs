@@ -1,10 +1,9 @@
 //! Noise of the sensor.
 
-use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::decay::Decay;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Draws, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y -> y + n`, on the plant's first channel, with Gaussian `n` of standard deviation `std`, independent from row to row; in
 /// the form `coloured`, of the correlation `exp(-dt / correlation_time)` over a time `dt`.
@@ -59,6 +58,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Process {
     std: Vec<f64>,
     correlation_time: Vec<f64>,
@@ -67,7 +67,7 @@ struct Process {
     /// Time of the last row [s]; none before the first, at which the process is already what it always is.
     last: Option<f64>,
     decay: Decay,
-    draws: ChaCha8Rng,
+    draws: Draws,
 }
 
 impl<P: Plant> Law<P> for Process

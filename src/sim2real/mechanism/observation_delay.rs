@@ -49,6 +49,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Late<P: Plant> {
     lines: Vec<Line<P::Observation>>,
     rates: &'static [(usize, usize)],
@@ -66,6 +67,7 @@ where
 }
 
 /// The past of one lane, as far back as its delay reaches.
+#[derive(Clone)]
 struct Line<O> {
     seconds: f64,
     /// Rows (time [s], observation), oldest first.

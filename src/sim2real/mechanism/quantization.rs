@@ -46,6 +46,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Steps(Vec<f64>);
 
 impl<P: Plant> Law<P> for Steps

@@ -45,6 +45,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Ramp {
     rate: Vec<f64>,
     /// What the actuator gives at the start of the tick; none before the first command, which it has already reached.

@@ -34,6 +34,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Folded(Vec<f64>);
 
 impl<P: Plant> Law<P> for Folded

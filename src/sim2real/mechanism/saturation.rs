@@ -48,6 +48,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct BentLimit {
     limits: Vec<f64>,
     sharpness: Vec<f64>,
@@ -68,6 +69,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Limit(Vec<f64>);
 
 impl<P: Plant> Law<P> for Limit
@@ -82,6 +84,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct SoftLimit(Vec<f64>);
 
 impl<P: Plant> Law<P> for SoftLimit

@@ -42,6 +42,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct BentFactor {
     factor: Vec<f64>,
     bow: Vec<f64>,
@@ -60,6 +61,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Factor(Vec<f64>);
 
 impl<P: Plant> Law<P> for Factor

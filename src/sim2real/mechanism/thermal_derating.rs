@@ -66,6 +66,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Heat {
     strength: Vec<f64>,
     time_constant: Vec<f64>,
@@ -89,6 +90,7 @@ impl Heat {
     }
 }
 
+#[derive(Clone)]
 struct Magnets(Heat);
 
 impl<P: Plant> Law<P> for Magnets
@@ -100,6 +102,7 @@ where
     }
 }
 
+#[derive(Clone)]
 struct Copper(Heat);
 
 impl<P: Plant> Law<P> for Copper

@@ -1,0 +1,367 @@
+//! The data of one instrument as a feed reads them: whole, or from streams with some rows around the present at hand.
+
+use std::fmt;
+use std::ops::Range;
+
+use crate::sim2real::Timestamp;
+
+use super::stream::{Known, Stream, StreamError};
+use super::{Bar, Book, DataNotes, DepthChange, EventKind, History, OrderEvent, Print, Quote, Quotes};
+
+/// The kinds of rows a market tells, in the order in which they come at one instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum RowKind {
+    Bars,
+    Trades,
+    Depth,
+    Orders,
+    Quotes,
+}
+
+impl RowKind {
+    const COUNT: usize = 5;
+    pub const ALL: [Self; Self::COUNT] = [Self::Bars, Self::Trades, Self::Depth, Self::Orders, Self::Quotes];
+
+    /// What a row of it is to a strategy.
+    pub fn event(self) -> EventKind {
+        match self {
+            Self::Bars => EventKind::Bar,
+            Self::Trades => EventKind::Trade,
+            Self::Depth | Self::Orders => EventKind::Depth,
+            Self::Quotes => EventKind::Quote,
+        }
+    }
+}
+
+/// Streams of the data of one instrument: what a backtest runs on that does not hold them in memory.
+#[derive(Default)]
+pub struct Sources {
+    /// Bars.
+    pub bars: Option<Box<dyn Stream<Bar>>>,
+    /// Quotes.
+    pub quotes: Option<Box<dyn Stream<Known<Book>>>>,
+    /// Trades.
+    pub trades: Option<Box<dyn Stream<Known<Print>>>>,
+    /// Changes of the book, price by price.
+    pub depth: Option<Box<dyn Stream<DepthChange>>>,
+    /// Events of resting orders.
+    pub order_events: Option<Box<dyn Stream<OrderEvent>>>,
+}
+
+impl fmt::Debug for Sources {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bars, quotes, trades, depth, order_events } = self;
+        let there =
+            [bars.is_some(), quotes.is_some(), trades.is_some(), depth.is_some(), order_events.is_some()].map(usize::from);
+        write!(f, "Sources({} streams)", there.iter().sum::<usize>())
+    }
+}
+
+impl Sources {
+    fn has(&self, kind: RowKind) -> bool {
+        match kind {
+            RowKind::Bars => self.bars.is_some(),
+            RowKind::Trades => self.trades.is_some(),
+            RowKind::Depth => self.depth.is_some(),
+            RowKind::Orders => self.order_events.is_some(),
+            RowKind::Quotes => self.quotes.is_some(),
+        }
+    }
+
+    fn notes(&self) -> Vec<DataNotes> {
+        let Self { bars, quotes, trades, depth, order_events } = self;
+        let all = [
+            bars.as_ref().and_then(|s| s.notes()),
+            quotes.as_ref().and_then(|s| s.notes()),
+            trades.as_ref().and_then(|s| s.notes()),
+            depth.as_ref().and_then(|s| s.notes()),
+            order_events.as_ref().and_then(|s| s.notes()),
+        ];
+        all.into_iter().flatten().cloned().collect()
+    }
+}
+
+/// The data of one instrument. Rows are known by their numbers from the first of all, be it at hand or not.
+#[derive(Debug)]
+pub(super) struct Line<'d> {
+    data: Data<'d>,
+    /// Which kinds there are.
+    kinds: [bool; RowKind::COUNT],
+    /// Number of the first row at hand.
+    first: [usize; RowKind::COUNT],
+    /// From this row on, more has to be read: it is at hand itself, but maybe not all that happened at its instant.
+    limit: [usize; RowKind::COUNT],
+}
+
+#[derive(Debug)]
+enum Data<'d> {
+    Whole(&'d History),
+    Part(Box<Part>),
+}
+
+/// What is at hand of streams.
+#[derive(Debug)]
+struct Part {
+    at_hand: History,
+    sources: Sources,
+    books: Vec<Known<Book>>,
+    prints: Vec<Known<Print>>,
+}
+
+impl<'d> Line<'d> {
+    /// A history that is in memory as a whole.
+    pub fn whole(history: &'d History) -> Self {
+        let kinds = RowKind::ALL.map(|kind| count(history, kind) > 0);
+        let (first, limit) = ([0; RowKind::COUNT], [usize::MAX; RowKind::COUNT]);
+        Self { data: Data::Whole(history), kinds, first, limit }
+    }
+
+    /// What streams give; the first rows of each are read at once.
+    ///
+    /// # Errors
+    /// What the streams refuse.
+    pub fn of(sources: Sources) -> Result<Self, StreamError> {
+        let kinds = RowKind::ALL.map(|kind| sources.has(kind));
+        let part = Part { at_hand: History::default(), sources, books: Vec::new(), prints: Vec::new() };
+        let (first, limit) = ([0; RowKind::COUNT], [0; RowKind::COUNT]);
+        let mut line = Self { data: Data::Part(Box::new(part)), kinds, first, limit };
+        RowKind::ALL.into_iter().try_for_each(|kind| line.read_on(kind, 0, 0))?;
+        Ok(line)
+    }
+
+    /// The same once more, where its data are in memory as a whole: streams give their rows once.
+    pub fn forked(&self) -> Option<Self> {
+        match self.data {
+            Data::Whole(history) => Some(Self { data: Data::Whole(history), ..*self }),
+            Data::Part(_) => None,
+        }
+    }
+
+    /// The rows at hand.
+    #[cfg(feature = "io")]
+    pub fn into_at_hand(self) -> History {
+        match self.data {
+            Data::Whole(history) => history.clone(),
+            Data::Part(part) => part.at_hand,
+        }
+    }
+
+    /// Whether there are rows of that kind, or a stream of them.
+    pub fn tells(&self, kind: RowKind) -> bool {
+        self.kinds[kind as usize]
+    }
+
+    /// Number of all rows, where they are in memory.
+    pub fn rows(&self) -> Option<usize> {
+        match &self.data {
+            Data::Whole(history) => Some(history.rows()),
+            Data::Part(_) => None,
+        }
+    }
+
+    /// What was found in the data as far as they were read.
+    pub fn notes(&self) -> Vec<DataNotes> {
+        match &self.data {
+            Data::Whole(history) => history.notes().to_vec(),
+            Data::Part(part) => part.sources.notes(),
+        }
+    }
+
+    #[inline(always)]
+    fn at_hand(&self) -> &History {
+        match &self.data {
+            Data::Whole(history) => history,
+            Data::Part(part) => &part.at_hand,
+        }
+    }
+
+    /// The place of a row among those at hand, beyond all of them where it is not.
+    #[inline(always)]
+    fn place(&self, kind: RowKind, row: usize) -> usize {
+        row.wrapping_sub(self.first[kind as usize])
+    }
+
+    /// Bar `row`.
+    #[inline(always)]
+    pub fn bar(&self, row: usize) -> Option<&Bar> {
+        self.at_hand().bars().get(self.place(RowKind::Bars, row))
+    }
+
+    /// The quotes at hand, and the place of quote `row` among them.
+    #[inline(always)]
+    pub fn quotes(&self, row: usize) -> (&Quotes, usize) {
+        (self.at_hand().quotes(), self.place(RowKind::Quotes, row))
+    }
+
+    /// Quote `row`.
+    #[inline(always)]
+    pub fn quote(&self, row: usize) -> Option<Quote<'_>> {
+        let (quotes, place) = self.quotes(row);
+        quotes.all().get(place)
+    }
+
+    /// Trade `row`.
+    #[inline(always)]
+    pub fn print(&self, row: usize) -> Option<&Print> {
+        self.at_hand().prints().get(self.place(RowKind::Trades, row))
+    }
+
+    /// Changes of the book.
+    #[inline(always)]
+    pub fn depth(&self, rows: Range<usize>) -> &[DepthChange] {
+        let kind = RowKind::Depth;
+        self.at_hand().depth().get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
+    }
+
+    /// Events of resting orders.
+    #[inline(always)]
+    pub fn order_events(&self, rows: Range<usize>) -> &[OrderEvent] {
+        let kind = RowKind::Orders;
+        self.at_hand().order_events().get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
+    }
+
+    /// When a row happens, at the exchange: a bar when it is over. [`Timestamp::MAX`] beyond the last.
+    #[inline(always)]
+    pub fn time(&self, kind: RowKind, row: usize) -> Timestamp {
+        let (data, at) = (self.at_hand(), self.place(kind, row));
+        let time = match kind {
+            RowKind::Bars => data.bars().get(at).map(|bar| bar.known_at),
+            RowKind::Quotes => data.quotes().times().get(at).copied(),
+            RowKind::Trades => data.prints().get(at).map(|print| print.time),
+            RowKind::Depth => data.depth().get(at).map(|change| change.time),
+            RowKind::Orders => data.order_events().get(at).map(|event| event.time),
+        };
+        time.unwrap_or(Timestamp::MAX)
+    }
+
+    /// When a row can be known.
+    #[inline(always)]
+    pub fn known_at(&self, kind: RowKind, row: usize) -> Timestamp {
+        let (data, at) = (self.at_hand(), self.place(kind, row));
+        let known_at = match kind {
+            RowKind::Trades => data.print_known_at(at),
+            RowKind::Depth => data.depth().get(at).map(|change| change.known_at),
+            RowKind::Orders => data.order_events().get(at).map(|event| event.known_at),
+            RowKind::Bars | RowKind::Quotes => return self.time(kind, row),
+        };
+        known_at.unwrap_or(Timestamp::MAX)
+    }
+
+    /// One row behind the last of those that belong to the same instant as `row`: a book is told in many changes, and is
+    /// whole when all of one instant are in.
+    #[inline(always)]
+    pub fn batch(&self, kind: RowKind, row: usize) -> usize {
+        let (data, at) = (self.at_hand(), self.place(kind, row));
+        match kind {
+            RowKind::Depth => row + same(data.depth(), at, |change| change.time),
+            RowKind::Orders => row + same(data.order_events(), at, |event| event.time),
+            RowKind::Bars | RowKind::Quotes | RowKind::Trades => row + 1,
+        }
+    }
+
+    /// Whether more has to be read before row `next` can be given out.
+    #[inline(always)]
+    pub fn is_low(&self, kind: RowKind, next: usize) -> bool {
+        next >= self.limit[kind as usize]
+    }
+
+    /// Reads until row `next` can be given out with all of its instant, and the one behind it is at hand; rows before `keep` may
+    /// be forgotten.
+    ///
+    /// # Errors
+    /// What the stream refuses.
+    #[cold]
+    pub fn read_on(&mut self, kind: RowKind, next: usize, keep: usize) -> Result<(), StreamError> {
+        let Data::Part(part) = &mut self.data else { return Ok(()) };
+        let (first, limit) = (&mut self.first[kind as usize], &mut self.limit[kind as usize]);
+        let gone = keep.saturating_sub(*first).min(count(&part.at_hand, kind));
+        part.forget(kind, gone);
+        *first += gone;
+        while next >= *limit {
+            let more = part.refill(kind)?;
+            *limit = if more { *first + last_instant(&part.at_hand, kind) } else { usize::MAX };
+        }
+        Ok(())
+    }
+}
+
+/// How many rows from `at` on happened at the instant of that row.
+#[inline(always)]
+fn same<T>(rows: &[T], at: usize, time: impl Fn(&T) -> Timestamp) -> usize {
+    let rest = rows.get(at..).unwrap_or_default();
+    rest.first().map_or(1, |first| rest.iter().take_while(|row| time(row) == time(first)).count())
+}
+
+/// Place of the first row of the last instant at hand.
+fn last_instant(data: &History, kind: RowKind) -> usize {
+    fn of<T>(rows: &[T], time: impl Fn(&T) -> Timestamp) -> usize {
+        let Some(last) = rows.last() else { return 0 };
+        rows.len() - rows.iter().rev().take_while(|row| time(row) == time(last)).count()
+    }
+    match kind {
+        RowKind::Depth => of(data.depth(), |change| change.time),
+        RowKind::Orders => of(data.order_events(), |event| event.time),
+        RowKind::Bars | RowKind::Quotes | RowKind::Trades => count(data, kind).saturating_sub(1),
+    }
+}
+
+/// How many rows of a kind are in `data`.
+fn count(data: &History, kind: RowKind) -> usize {
+    match kind {
+        RowKind::Bars => data.bars().len(),
+        RowKind::Trades => data.prints().len(),
+        RowKind::Depth => data.depth().len(),
+        RowKind::Orders => data.order_events().len(),
+        RowKind::Quotes => data.quotes().len(),
+    }
+}
+
+impl Part {
+    /// Forgets the oldest `gone` rows of a kind.
+    fn forget(&mut self, kind: RowKind, gone: usize) {
+        let rows = self.at_hand.rows_mut();
+        match kind {
+            RowKind::Bars => drop(rows.bars.drain(..gone)),
+            RowKind::Trades => {
+                rows.prints.drain(..gone);
+                rows.prints_known.drain(..gone);
+            }
+            RowKind::Depth => drop(rows.depth.drain(..gone)),
+            RowKind::Orders => drop(rows.order_events.drain(..gone)),
+            RowKind::Quotes => rows.quotes.keep_newest(rows.quotes.len() - gone),
+        }
+    }
+
+    /// Reads the next rows of a kind; false at the end of its stream, or where there is none.
+    fn refill(&mut self, kind: RowKind) -> Result<bool, StreamError> {
+        let Self { at_hand, sources, books, prints } = self;
+        let rows = at_hand.rows_mut();
+        match kind {
+            RowKind::Bars => sources.bars.as_mut().map_or(Ok(false), |stream| stream.refill(rows.bars)),
+            RowKind::Depth => sources.depth.as_mut().map_or(Ok(false), |stream| stream.refill(rows.depth)),
+            RowKind::Orders => sources.order_events.as_mut().map_or(Ok(false), |stream| stream.refill(rows.order_events)),
+            RowKind::Trades => {
+                let Some(stream) = &mut sources.trades else { return Ok(false) };
+                let more = stream.refill(prints)?;
+                for Known { known_at, what } in prints.drain(..) {
+                    rows.prints.push(what);
+                    rows.prints_known.push(known_at);
+                }
+                Ok(more)
+            }
+            RowKind::Quotes => {
+                let Some(stream) = &mut sources.quotes else { return Ok(false) };
+                let more = stream.refill(books)?;
+                for Known { known_at, what } in books.drain(..) {
+                    let (bids, asks) = (what.opposite(super::Side::Sell), what.opposite(super::Side::Buy));
+                    let deepest = bids.len().max(asks.len());
+                    if rows.quotes.depth() < deepest {
+                        rows.quotes.deepen(deepest);
+                    }
+                    rows.quotes.push(known_at, bids, asks);
+                }
+                Ok(more)
+            }
+        }
+    }
+}

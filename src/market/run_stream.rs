@@ -1,0 +1,91 @@
+//! Runs whose data are read while they go: `stream = true`.
+
+use crate::io::{DataEntry, FeedKind, InputError, RunFile, TableChunks, file_hash};
+use crate::sim2real::Timestamp;
+
+use super::line::Line;
+use super::run::{no_data, provenance, settings, span, venue};
+use super::run_log::InputFile;
+use super::stream::{Between, Dated, Stream, StreamError};
+use super::{Backtest, BacktestError, FileStream, History, Instrument, PreparedRun, Session, Sources, run_needs};
+
+/// Sets up the backtest of `run` to read its data while it runs, so that what is in memory does not grow with their length. Of
+/// each file the first rows are read, to see that mechanisms have what they need.
+///
+/// # Errors
+/// As [`prepare_run`](super::prepare_run), as far as the first rows show it; bars without an `interval`.
+pub fn prepare_streaming_run(run: &RunFile) -> Result<PreparedRun, InputError> {
+    let venue = venue(run)?;
+    let begun = sources(run)?.into_iter().map(|sources| Ok(Line::of(sources)?.into_at_hand()));
+    let begun = begun.collect::<Result<Vec<History>, StreamError>>().map_err(|error| input(run, error))?;
+    let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
+    run_needs::check(run, &venue, &instruments, &begun)?;
+    let settings = settings(run, &begun)?;
+    let files = run
+        .data
+        .iter()
+        .map(|entry| Ok(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: None }));
+    let files = files.collect::<Result<_, InputError>>()?;
+    let backtest = Backtest::streaming(instruments, venue, settings).map_err(|error| super::explained(run, &error))?;
+    Ok(PreparedRun { provenance: provenance(run, &backtest, files)?, backtest, streamed: Some(Box::new(run.clone())) })
+}
+
+impl PreparedRun {
+    /// Starts the backtest: on the data in memory, or from the beginning of its files.
+    ///
+    /// # Errors
+    /// Files that cannot be opened any more, and what is refused of their first rows.
+    pub fn start(&self) -> Result<Session<'_>, BacktestError> {
+        match &self.streamed {
+            None => Ok(self.backtest.start()),
+            Some(run) => {
+                let data = |error: InputError| BacktestError::Data(Box::new(StreamError::Input(error)));
+                self.backtest.start_on(sources(run).map_err(data)?)
+            }
+        }
+    }
+}
+
+fn input(run: &RunFile, error: StreamError) -> InputError {
+    match error {
+        StreamError::Input(error) => error,
+        StreamError::History(error) => super::explained(run, &BacktestError::Data(Box::new(StreamError::History(error)))),
+    }
+}
+
+/// The streams of a run, of each instrument those of its files.
+fn sources(run: &RunFile) -> Result<Vec<Sources>, InputError> {
+    let of = |(index, symbol): (usize, &str)| {
+        let mut sources = Sources::default();
+        let mut entries = run.data.iter().filter(|entry| entry.symbol == symbol).peekable();
+        if entries.peek().is_none() {
+            return Err(no_data(run, index, symbol));
+        }
+        entries.try_for_each(|entry| add(&mut sources, run, entry))?;
+        Ok(sources)
+    };
+    run.instruments.iter().map(|instrument| instrument.symbol.as_str()).enumerate().map(of).collect()
+}
+
+fn add(sources: &mut Sources, run: &RunFile, entry: &DataEntry) -> Result<(), InputError> {
+    let (path, format, rows) = (&entry.path, &entry.format, TableChunks::ROWS);
+    let span = span(run);
+    match entry.kind {
+        FeedKind::Bars => sources.bars = Some(cut(FileStream::bars(path, format, entry.interval, rows)?, span)),
+        FeedKind::Quotes => sources.quotes = Some(cut(FileStream::quotes(path, format, entry.interval, rows)?, span)),
+        FeedKind::Trades => sources.trades = Some(cut(FileStream::trades(path, format, rows)?, span)),
+        FeedKind::Book if format.layout.tells_orders() => {
+            sources.order_events = Some(cut(FileStream::order_events(path, format, rows)?, span));
+        }
+        FeedKind::Book => sources.depth = Some(cut(FileStream::depth(path, format, rows)?, span)),
+    }
+    Ok(())
+}
+
+/// The stream without what was known before or after the run.
+fn cut<T: Dated + 'static>(stream: impl Stream<T> + 'static, span: Option<(Timestamp, Timestamp)>) -> Box<dyn Stream<T>> {
+    match span {
+        Some((start, last)) => Box::new(Between::new(stream, start, last)),
+        None => Box::new(stream),
+    }
+}
