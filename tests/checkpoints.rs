@@ -28,9 +28,13 @@ fn random(moves: &[(i32, u8)]) -> Backtest {
             [open, open.max(close) + wide, open.min(close) - wide, close]
         })
         .collect();
-    let order = Latency::Exponential { mean: 70.0 };
-    let latencies =
-        Latencies { feed: Latency::Uniform { low: 0.0, high: 90.0 }, order, response: order, ..Latencies::default() };
+    let order = Latency::Exponential { least: 0.5, mean: 70.0 };
+    let latencies = Latencies {
+        feed: Latency::Uniform { least: 0.0, most: 90.0 },
+        response: order.clone(),
+        order,
+        ..Latencies::default()
+    };
     let parts = [("textbook_slippage", "", 5.0), ("adverse_selection", "", 1.0), ("transient_impact", "exponential", 9.0)];
     let about =
         trueup::market::Instrument { average_daily_volume: Some(1e5), daily_volatility: Some(0.02), ..instrument("A") };
@@ -118,8 +122,9 @@ fn a_fork_differs_by_its_fill_alone() {
     assert_eq!((fills(&run), fills(&fork)), (vec![(MINUTE, 10.0, 101.5)], vec![(MINUTE, 10.0, 101.75)]));
     // A quarter more for each of ten; the fee is that of the fill it replaces.
     assert_eq!(run.blotter.fills[0].fee, fork.blotter.fills[0].fee);
-    let gap: Vec<f64> = run.equity.iter().zip(&fork.equity).map(|(a, b)| a.equity - b.equity).collect();
-    assert_eq!(gap, [0.0, 2.5, 2.5, 2.5]);
+    let cents = |gap: f64| (gap * 100.0).round();
+    let gap: Vec<f64> = run.equity.iter().zip(&fork.equity).map(|(a, b)| cents(a.equity - b.equity)).collect();
+    assert_eq!(gap, [0.0, 250.0, 250.0, 250.0]);
 }
 
 #[test]

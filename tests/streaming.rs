@@ -11,8 +11,7 @@ use market_scene::{Busy, MINUTE, instrument, settings, venue, whole_bar};
 use proptest::prelude::*;
 use trueup::market::{
     Backtest, BacktestError, Bar, Book, Dated, DepthAction, DepthChange, History, HistoryError, Known, Latencies, Latency,
-    Level, OrderAction, OrderEvent, Orders, Price, Print, Quotes, Record, Settings, Side, Sources, Stored,
-    Strategy as Trader, Stream, StreamError, Ticket, View,
+    Level, OrderAction, OrderEvent, Price, Print, Quotes, Record, Settings, Side, Sources, Stored, Stream, StreamError,
 };
 use trueup::sim2real::{Seed, Timestamp};
 
@@ -113,7 +112,7 @@ fn rows(kinds: [bool; 4], all: [Steps; 4]) -> Rows {
 
 fn of_latency(seconds: f64) -> Settings {
     let feed = Latency::Constant { seconds };
-    let order = Latency::Uniform { low: 0.0, high: 2.0 };
+    let order = Latency::Uniform { least: 0.0, most: 2.0 };
     Settings { seed: Seed(4), latencies: Latencies { feed, order, ..Latencies::default() }, ..settings() }
 }
 
@@ -203,7 +202,7 @@ fn a_thin_equity_curve_tells_of_the_same_fall() {
         session.finish().unwrap()
     };
     let (whole, thin) = (run(None), run(every));
-    assert_eq!((whole.equity.len(), &whole.blotter, whole.ledger), (3_000, &thin.blotter, thin.ledger));
+    assert_eq!((whole.equity.len(), &whole.blotter, &whole.ledger), (3_000, &thin.blotter, &thin.ledger));
     assert!(thin.equity.len() <= 4 * 51, "{}", thin.equity.len());
     let ends = |record: &Record| {
         let equity = record.equity.iter().map(|point| point.equity);

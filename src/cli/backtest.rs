@@ -5,13 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::io::{InputError, OutputFolder, Overwrite, RunFile, hint_among};
-use crate::market::{
-    Instrument, PreparedRun, Record, RunOutputs, Session, Strategy, explained, prepare_run, prepare_streaming_run,
-};
+use crate::market::{Instrument, RunOutputs, Strategy, prepare_run, prepare_streaming_run};
 use crate::report::quantity::UNDEFINED;
 use crate::strategies::{self, StrategyError};
 
-use super::screen::{Progress, Screen};
+use super::checkpoint::{Going, Ran, Turn};
+use super::screen::Screen;
 use super::stop::{Outcome, Stop};
 
 /// Run a strategy on past bars or quotes, event by event
@@ -38,22 +37,39 @@ pub(super) struct Run {
     /// Seed of all randomness [default: as RUN.toml has it]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    #[command(flatten)]
+    turn: Turn,
 }
 
 impl Run {
     pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
         let mut file = RunFile::read(&self.run)?;
         file.run.seed = self.seed.unwrap_or(file.run.seed);
-        let mut strategy = strategy(&file)?;
+        strategy(&file)?;
         let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
         if let Some(folder) = &self.out {
             OutputFolder::create(folder, overwrite)?.check_free(&RunOutputs::FILES)?;
         }
+        self.turn.check_free(overwrite)?;
         let prepared = if file.run.stream { prepare_streaming_run(&file)? } else { prepare_run(&file)? };
-        let record = run(&prepared, strategy.as_mut(), &screen.progress());
-        let record = record.map_err(|error| explained(&file, &error))?;
-        let outputs = prepared.outputs(&record).map_err(|error| Stop::Bug(error.to_string()))?;
-        let mut text = if self.json { outputs.json()? } else { told(&outputs, screen) };
+        let progress = screen.progress();
+        let going = Going { file: &file, prepared: &prepared, progress: &progress, strategy: &|| strategy(&file) };
+        let (record, beside) = match self.turn.run(&going, overwrite)? {
+            Ran::Whole { record, beside } => (record, beside),
+            Ran::Saved(text) => {
+                drop(progress);
+                screen.print(&text)?;
+                return Ok(Outcome::Done);
+            }
+        };
+        drop(progress);
+        let shown = |record| prepared.outputs(record).map_err(|error| Stop::Bug(error.to_string()));
+        let outputs = shown(&record)?;
+        let mut text = match &beside {
+            _ if self.json => outputs.json()?,
+            None => told(&outputs, screen),
+            Some(beside) => told_beside(&shown(beside)?, &outputs, screen),
+        };
         match &self.out {
             Some(folder) => {
                 let mut output = OutputFolder::create(folder, overwrite)?;
@@ -112,30 +128,20 @@ pub(super) fn explained_strategy(file: &RunFile, error: &StrategyError) -> Input
     }
 }
 
-/// Events between two looks at the progress.
-const EVENTS_A_TURN: usize = 20_000;
-
-fn run(
-    prepared: &PreparedRun,
-    strategy: &mut dyn Strategy,
-    progress: &Progress,
-) -> Result<Record, crate::market::BacktestError> {
-    let mut session: Session<'_> = prepared.start()?;
-    loop {
-        let (done, of) = session.progress();
-        progress.tell("running", done, of.unwrap_or_default());
-        for _ in 0..EVENTS_A_TURN {
-            if session.step(strategy)?.is_none() {
-                return session.finish();
-            }
-        }
-    }
-}
-
 fn told(outputs: &RunOutputs, screen: &Screen) -> String {
     let mut table = screen.table(["figure", ">value"]);
     for metric in &outputs.page.metrics {
         table.add_row([metric.name.clone(), metric.value.clone().unwrap_or_else(|| UNDEFINED.to_owned())]);
     }
     format!("{}\n\n{}\n", screen.wrapped("", &outputs.page.title), table.trim_fmt())
+}
+
+/// The figures of a run and of its fork.
+fn told_beside(run: &RunOutputs, fork: &RunOutputs, screen: &Screen) -> String {
+    let mut table = screen.table(["figure", ">run", ">fork"]);
+    for (metric, other) in run.page.metrics.iter().zip(&fork.page.metrics) {
+        let value = |value: &Option<String>| value.clone().unwrap_or_else(|| UNDEFINED.to_owned());
+        table.add_row([metric.name.clone(), value(&metric.value), value(&other.value)]);
+    }
+    format!("{}\n\n{}\n", screen.wrapped("", &fork.page.title), table.trim_fmt())
 }

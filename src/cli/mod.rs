@@ -7,6 +7,7 @@ mod audit;
 mod backtest;
 mod calibrate;
 mod case;
+mod checkpoint;
 mod data;
 mod demo;
 mod diagnose;

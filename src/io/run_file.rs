@@ -62,7 +62,7 @@ pub struct RunSection {
     #[serde(default)]
     pub stream: bool,
     /// Time for which the equity curve keeps its first, lowest, highest and last point alone [ns]; none for a point an event, or a
-    /// second where data are streamed.
+    /// minute where data are streamed.
     #[serde(default, deserialize_with = "span")]
     pub equity_every: Option<i64>,
 }

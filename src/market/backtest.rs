@@ -128,6 +128,8 @@ pub struct Held {
     pub invested: usize,
     /// Sum over events of what was held, short positions counted as positive, over equity.
     pub leverage: f64,
+    /// Mean of the equity at all points, be they kept or not; none without an event.
+    pub mean_equity: Option<f64>,
     /// Bars within which orders rested on both sides of the open, so that a rule had to say which was met first.
     pub ambiguous_bars: usize,
 }

@@ -114,7 +114,8 @@ impl<'d> Session<'d> {
     }
 
     /// Whether it has come to `moment`.
-    fn is_at(&self, moment: Moment) -> bool {
+    #[must_use]
+    pub fn is_at(&self, moment: Moment) -> bool {
         match moment {
             Moment::Events(events) => self.events() >= events,
             Moment::Before(time) => self.next_time().is_none_or(|next| next >= time),

@@ -12,6 +12,9 @@ pub(super) struct EquityCurve {
     points: Vec<EquityPoint>,
     /// The time that is under way.
     now: Option<Stretch>,
+    /// Sum of all points, kept or not, and their number.
+    sum: f64,
+    count: usize,
 }
 
 /// A time of which few points are kept.
@@ -28,13 +31,15 @@ impl EquityCurve {
     /// No points yet, with room for those of `rows` rows of data.
     pub fn new(every: Option<i64>, rows: Option<usize>) -> Self {
         let room = if every.is_none() { rows.unwrap_or_default() + 1 } else { 0 };
-        Self { every, points: Vec::with_capacity(room), now: None }
+        Self { every, points: Vec::with_capacity(room), now: None, sum: 0.0, count: 0 }
     }
 
     /// The equity of now.
     #[inline(always)]
     pub fn push(&mut self, time: Timestamp, equity: f64) {
         let point = EquityPoint { time, equity };
+        self.sum += equity;
+        self.count += 1;
         match self.every {
             None => self.points.push(point),
             Some(every) => self.thin(point, every),
@@ -44,6 +49,11 @@ impl EquityCurve {
     /// When the last point was.
     pub fn end(&self) -> Option<Timestamp> {
         self.now.as_ref().map(|now| now.last.time).or(self.points.last().map(|point| point.time))
+    }
+
+    /// Mean of all points, kept or not; none where there is none.
+    pub fn mean(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / self.count as f64)
     }
 
     /// All points that are kept.

@@ -80,7 +80,7 @@ pub(super) fn settings(run: &RunFile, histories: &[History]) -> Result<Settings,
         reference: reference(run, histories)?,
         matching: run.matching::<Matching>()?,
         latencies: run.latency::<Latencies>()?,
-        equity_every: run.run.equity_every.or(run.run.stream.then_some(Timestamp::NANOS)),
+        equity_every: run.run.equity_every.or(run.run.stream.then_some(60 * Timestamp::NANOS)),
     })
 }
 

@@ -238,6 +238,7 @@ impl<'d> Session<'d> {
             self.equity.push(end, equity.to_f64());
         }
         self.held.ambiguous_bars = self.venue.floors.iter().map(|floor| floor.ambiguous_bars()).sum();
+        self.held.mean_equity = self.equity.mean();
         let data = self.feed.lines().iter().map(DataSeen::of).collect();
         Ok(Record { blotter: self.blotter, equity: self.equity.finish(), ledger: self.ledger, held: self.held, data })
     }

@@ -32,4 +32,4 @@ pub use residual::ChannelWeight;
 pub use run::Run;
 pub use seed::{Draws, Seed};
 pub use simulator::{Candidate, Simulator, Twin};
-pub use time::{Tick, Timestamp, written_instant};
+pub use time::{NotAnInstant, Tick, Timestamp, written_instant};

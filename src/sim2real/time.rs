@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::ops::{Add, Sub};
+use std::str::FromStr;
 
 use chrono::DateTime;
 use serde::de::Error;
@@ -87,8 +88,21 @@ pub fn written_instant<'de, D: Deserializer<'de>>(
         Written::Text(text) => text,
         Written::Toml(instant) => instant.to_string(),
     };
-    let instant = DateTime::parse_from_rfc3339(&text).ok().and_then(|t| t.timestamp_nanos_opt());
-    instant.map(Timestamp).ok_or_else(|| refuse(&text))
+    text.parse().map_err(|_| refuse(&text))
+}
+
+/// A text that is no instant.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} is no instant\nhint: such as \"2024-03-08T14:30:00Z\" (RFC 3339)")]
+pub struct NotAnInstant(String);
+
+impl FromStr for Timestamp {
+    type Err = NotAnInstant;
+
+    fn from_str(text: &str) -> Result<Self, NotAnInstant> {
+        let instant = DateTime::parse_from_rfc3339(text).ok().and_then(|t| t.timestamp_nanos_opt());
+        instant.map(Self).ok_or_else(|| NotAnInstant(text.to_owned()))
+    }
 }
 
 #[cfg(test)]

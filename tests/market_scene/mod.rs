@@ -193,15 +193,18 @@ impl Strategy for Busy {
         for k in 0..view.instruments().len() {
             let closes: i64 = view.bars(k).iter().map(|bar| bar.close.0).sum();
             let bids: u64 = view.quotes(k).last().and_then(|quote| quote.bid()).map_or(0, f64::to_bits);
-            let prints: u64 = view.prints(k).iter().map(|print| print.price.to_bits() ^ print.size.to_bits()).sum();
+            let prints: u64 = view
+                .prints(k)
+                .iter()
+                .fold(0, |sum, print| sum.rotate_left(3) ^ print.price.to_bits() ^ print.size.to_bits());
             self.seen = self.seen.rotate_left(5) ^ closes as u64 ^ bids ^ prints;
             let side = if self.seen.count_ones().is_multiple_of(2) { Side::Buy } else { Side::Sell };
             let Some(mark) = view.price(k) else { continue };
             match (self.events + self.seen) % 7 {
-                0 => drop(orders.submit(Ticket::market(k, side, quantity(3.0)))),
+                0 => _ = orders.submit(Ticket::market(k, side, quantity(3.0))),
                 1 | 2 => {
                     let price = Price(mark.0 / 10_000_000 * 10_000_000);
-                    drop(orders.submit(Ticket::limit(k, side, quantity(5.0), price)));
+                    _ = orders.submit(Ticket::limit(k, side, quantity(5.0), price));
                 }
                 3 => view.orders(k).iter().take(2).for_each(|order| orders.cancel(order.id)),
                 _ => {}

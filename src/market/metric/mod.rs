@@ -136,7 +136,6 @@ impl Metrics {
             _ => 0.0,
         };
         let growth = if initial > 0.0 { defined(last / initial) } else { None };
-        let mean_equity = points.iter().map(|point| point.equity).sum::<f64>() / points.len() as f64;
         let traded: f64 = record.blotter.fills.iter().map(|fill| (fill.price * fill.quantity).to_f64()).sum();
         let (mut realised, mut unrealised) = (0.0, 0.0);
         for position in record.ledger.positions() {
@@ -150,7 +149,8 @@ impl Metrics {
         let yearly = returns.make_a_year();
         let Drawdowns { deepest: drawdowns, longest } = Drawdowns::of(initial, points);
         let cagr = growth.filter(|g| *g > 0.0 && yearly).and_then(|g| defined(g.powf(1.0 / years) - 1.0));
-        let turnover = if mean_equity > 0.0 { defined(traded / mean_equity) } else { None };
+        let mean_equity = record.held.mean_equity.filter(|mean| *mean > 0.0);
+        let turnover = mean_equity.and_then(|mean| defined(traded / mean));
         let max_drawdown = drawdowns.first().copied();
         Ok(Self {
             initial_equity: initial,
