@@ -92,7 +92,11 @@ fn honest(diagnosis: &Diagnosis, overflows: bool) -> Result<(), TestCaseError> {
         prop_assert!(effect.parameters.values().all(|p| p.value.is_finite()), "{effect:?}");
     }
     prop_assert!(diagnosis.parameters.values().all(|p| p.value.is_finite()), "{:?}", diagnosis.parameters);
-    prop_assert!(!diagnosis.summary.is_empty() && !["NaN", "inf "].iter().any(|w| diagnosis.summary.contains(w)), "{}", diagnosis.summary);
+    prop_assert!(
+        !diagnosis.summary.is_empty() && !["NaN", "inf "].iter().any(|w| diagnosis.summary.contains(w)),
+        "{}",
+        diagnosis.summary
+    );
     let written = serde_json::to_string(diagnosis).unwrap();
     let read = serde_json::from_str::<Diagnosis>(&written);
     if !overflows {
@@ -110,7 +114,10 @@ fn a_twin_that_runs_away_has_no_error_that_could_be_told() {
     let outcome = diagnose(&twin, &fitted, &[], Seed(1), &|_, _, _| ());
     honest(&outcome.diagnosis, true).unwrap();
     let fits = &outcome.diagnosis.channels;
-    assert!(fits.iter().all(|f| !f.nominal_rmse.is_nan() && !f.recalibrated_rmse.is_nan() && !f.trued_rmse.is_nan()), "{fits:?}");
+    assert!(
+        fits.iter().all(|f| !f.nominal_rmse.is_nan() && !f.recalibrated_rmse.is_nan() && !f.trued_rmse.is_nan()),
+        "{fits:?}"
+    );
 }
 
 proptest! {

@@ -22,6 +22,17 @@ pub struct InstrumentEntry {
     pub average_daily_volume: Option<f64>,
     /// Standard deviation of the daily return (a fraction).
     pub daily_volatility: Option<f64>,
+    /// When its market is open: the name of a calendar that comes with the program, or the path of a TOML table. Runs alone
+    /// know it.
+    pub calendar: Option<String>,
+}
+
+impl InstrumentEntry {
+    /// The file of its calendar, as the document names it; none where it has no calendar, or one that goes by name.
+    #[must_use]
+    pub fn calendar_file(&self) -> Option<&str> {
+        self.calendar.as_deref().filter(|named| named.ends_with(".toml") || named.contains(['/', '\\']))
+    }
 }
 
 fn one() -> f64 {

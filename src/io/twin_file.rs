@@ -187,6 +187,10 @@ impl TwinFile {
         }
         check_mechanisms(&document, &table.mechanism)?;
         check_instruments(&document, &table.instrument)?;
+        if let Some(index) = table.instrument.iter().position(|instrument| instrument.calendar.is_some()) {
+            let error = document.error(&["instrument", &index.to_string(), "calendar"], "a twin has no use for a calendar");
+            return Err(error.hint("leave it out: a recording says itself when orders were filled"));
+        }
         if let Some(assumptions) = &table.assumptions {
             check_assumptions(&document, assumptions)?;
         }

@@ -1,11 +1,13 @@
 //! The backtest: what it is set up of, and what it leaves. Its loop is a [`Session`].
 
+use std::sync::Arc;
+
 use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
 use super::{
-    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError, Matching, MoneyError,
-    QueueModel, Reference, Session, Strategy,
+    Calendar, Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError, Matching,
+    MoneyError, QueueModel, Reference, Session, Strategy,
 };
 
 /// A backtest, as it was set up.
@@ -34,14 +36,17 @@ pub struct Settings {
     pub matching: Matching,
     /// How long messages take.
     pub latencies: Latencies,
+    /// When the market of each instrument is open, in their order. Instruments without a calendar, as those behind the last
+    /// here, trade whenever there are data, in days of UTC.
+    pub calendars: Vec<Option<Arc<Calendar>>>,
 }
 
 impl Settings {
     /// No borrowing: the sum of positions stays within the equity.
     #[must_use]
     pub fn with_cash(cash: Cash) -> Self {
-        let (matching, latencies) = Default::default();
-        Self { cash, seed: Seed::default(), max_leverage: 1.0, reference: None, matching, latencies }
+        let (matching, latencies, calendars) = Default::default();
+        Self { cash, seed: Seed::default(), max_leverage: 1.0, reference: None, matching, latencies, calendars }
     }
 }
 
@@ -58,6 +63,16 @@ pub enum BacktestError {
         instruments: usize,
         /// Number of histories.
         histories: usize,
+    },
+    /// Calendars of instruments that are not there.
+    #[error(
+        "there are {instruments} instruments and calendars for {calendars}\nhint: give calendars in the order of the instruments"
+    )]
+    Calendars {
+        /// Number of instruments.
+        instruments: usize,
+        /// Number of calendars.
+        calendars: usize,
     },
     /// A leverage that cannot be.
     #[error("max_leverage is {0}\nhint: it is a number above 0; 1 borrows nothing")]
@@ -133,6 +148,9 @@ pub struct Record {
     pub ledger: Ledger,
     /// How much was held.
     pub held: Held,
+    /// Of each instrument, rows from outside the sessions of its calendar, which no order met; none where it has no calendar,
+    /// and nothing at all where no instrument has one.
+    pub outside: Vec<Option<usize>>,
 }
 
 impl Backtest {
@@ -151,6 +169,10 @@ impl Backtest {
         }
         if histories.iter().all(History::is_empty) {
             return Err(BacktestError::NoData);
+        }
+        if settings.calendars.len() > instruments.len() {
+            let (instruments, calendars) = (instruments.len(), settings.calendars.len());
+            return Err(BacktestError::Calendars { instruments, calendars });
         }
         if !settings.max_leverage.is_finite() || settings.max_leverage <= 0.0 {
             return Err(BacktestError::Leverage(settings.max_leverage));

@@ -216,6 +216,17 @@ impl Calendar {
         of_date.filter_map(move |session| session.hours(date, self.zone, shorter))
     }
 
+    /// The day of trading of `date`: from the open of its first session to the close of its last, breaks between them
+    /// included.
+    #[must_use]
+    pub fn day(&self, date: NaiveDate) -> Option<Hours> {
+        self.sessions_on(date).reduce(|day, session| Hours {
+            close: session.close,
+            half_day: day.half_day || session.half_day,
+            ..day
+        })
+    }
+
     /// What shortens the sessions of `date`: of several half days, the latest open and the earliest close.
     fn shorter(&self, date: NaiveDate) -> Option<Shorter> {
         let of_date = self.half_days.iter().filter(|(occasion, _)| occasion.falls_on(date)).map(|(_, shorter)| *shorter);

@@ -5,6 +5,7 @@ use chrono_tz::Tz;
 use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash, listed_mechanism};
 use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 
+use super::run_calendar::ReadCalendars;
 use super::run_log::InputFile;
 use super::{
     Backtest, BacktestError, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError, Provenance,
@@ -18,6 +19,7 @@ pub struct PreparedRun {
     pub backtest: Backtest,
     /// What it was made of.
     pub provenance: Provenance,
+    calendars: ReadCalendars,
 }
 
 /// Sets up the backtest of `run`, and reads its data. The strategy is for the caller to build, from `run.strategy` and
@@ -30,7 +32,10 @@ pub struct PreparedRun {
 pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     // What needs no data is said before they are read.
     venue(run)?;
+    let mut calendars = ReadCalendars::default();
+    calendars.of(run)?;
     let mut inputs = vec![own_document(run)?];
+    inputs.extend(calendars.files.iter().cloned());
     let mut read = Vec::new();
     for entry in &run.data {
         let history = history(entry)?;
@@ -40,7 +45,7 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     }
     let joined = run.instruments.iter().enumerate().map(|(index, entry)| joined(run, index, &entry.symbol, &mut read));
     let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
-    let backtest = set_up(run, histories)?;
+    let backtest = set_up(run, histories, &mut calendars)?;
     let venue = backtest.venue();
     let provenance = Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -52,11 +57,11 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
         zone: zone(run),
         inputs,
     };
-    Ok(PreparedRun { backtest, provenance })
+    Ok(PreparedRun { backtest, provenance, calendars })
 }
 
 /// The backtest of `run` on data that were read.
-fn set_up(run: &RunFile, histories: Vec<History>) -> Result<Backtest, InputError> {
+fn set_up(run: &RunFile, histories: Vec<History>, calendars: &mut ReadCalendars) -> Result<Backtest, InputError> {
     let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     let venue = venue(run)?;
     run_needs::check(run, &venue, &instruments, &histories)?;
@@ -69,6 +74,7 @@ fn set_up(run: &RunFile, histories: Vec<History>) -> Result<Backtest, InputError
         reference: reference(run, &histories)?,
         matching: run.matching::<Matching>()?,
         latencies: run.latency::<Latencies>()?,
+        calendars: calendars.of(run)?,
     };
     Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))
 }
@@ -79,7 +85,7 @@ impl PreparedRun {
     /// # Errors
     /// As [`prepare_run`], but for what it says of files.
     pub fn variant(&self, run: &RunFile) -> Result<Backtest, InputError> {
-        set_up(run, self.backtest.histories().to_vec())
+        set_up(run, self.backtest.histories().to_vec(), &mut self.calendars.clone())
     }
 
     /// All that `record`, the record of this backtest, is shown as.

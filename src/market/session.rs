@@ -9,11 +9,12 @@ use super::agenda::{Agenda, Due, Phase};
 use super::backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 use super::blotter::Blotter;
 use super::carry::Carry;
+use super::hours::Timetable;
 use super::known::Known;
 use super::latency::Clocks;
 use super::mail::Mail;
 use super::transit::Transit;
-use super::venue::{Detail, Outcome, Resting, Rules, Setup, Venue};
+use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{
     Arrival, Cash, Daily, DepthBook, Event, EventKind, Feed, History, Ledger, MoneyError, OrderId, Orders, Price, Reference,
     Strategy, View,
@@ -28,6 +29,7 @@ pub struct Session<'d> {
     direct: bool,
     pub(super) agenda: Agenda,
     pub(super) clocks: Clocks,
+    pub(super) timetable: Timetable<'d>,
     pub(super) known: Vec<Known>,
     pub(super) daily: Vec<Daily>,
     pub(super) venue: Venue,
@@ -96,9 +98,13 @@ impl<'d> Session<'d> {
             rules: Rules { reference, intrabar, limit_fill, queue, origin },
             seed,
         };
-        let venue = Venue::new(&setup.venue, &venue);
+        let mut venue = Venue::new(&setup.venue, &venue);
         let conceding = venue.conceding.len();
         let count = setup.instruments.len();
+        let timetable = Timetable::new(setup.settings.calendars.iter().map(Option::as_deref), count);
+        for (k, _) in timetable.each().iter().enumerate().filter(|(_, hours)| hours.is_some()) {
+            venue.floors[k].auctions = Some(Auctions::new(!setup.histories[k].prints().is_empty()));
+        }
         Self {
             setup,
             equity: Vec::with_capacity(feed.events() + 1),
@@ -107,6 +113,7 @@ impl<'d> Session<'d> {
             agenda: Agenda::default(),
             direct: latencies.feed.is_none(),
             clocks: Clocks::new(latencies, seed),
+            timetable,
             known,
             daily: vec![Daily::default(); count],
             blotter: Blotter { conceding: venue.conceding.clone(), ..Blotter::default() },
@@ -189,7 +196,8 @@ impl<'d> Session<'d> {
             self.equity.push(EquityPoint { time: end, equity: equity.to_f64() });
         }
         self.held.ambiguous_bars = self.venue.floors.iter().map(|floor| floor.ambiguous_bars()).sum();
-        Ok(Record { blotter: self.blotter, equity: self.equity, ledger: self.ledger, held: self.held })
+        let outside = self.timetable.outside();
+        Ok(Record { blotter: self.blotter, equity: self.equity, ledger: self.ledger, held: self.held, outside })
     }
 
     /// What is due next happens: the event it makes for the strategy, if it asked to be woken.
@@ -222,15 +230,15 @@ impl<'d> Session<'d> {
     #[inline(always)]
     fn happen(&mut self, arrival: &Arrival) -> Result<(), BacktestError> {
         let Event { time, instrument, kind } = arrival.event;
+        if !self.timetable.is_empty() {
+            self.keep_hours_of(arrival);
+        }
         let history = &self.setup.histories[instrument];
         let floor = &mut self.venue.floors[instrument];
         match kind {
             EventKind::Bar => {
                 if floor.by_bars() && !floor.is_idle() {
-                    let bars = history.bars();
-                    let bar = &bars[arrival.row];
-                    floor.at_row(0, arrival.row);
-                    floor.on_bar(bar, ends_day(bars.get(arrival.row + 1).map(|next| next.open_at), bar.open_at));
+                    self.meet_bar(instrument, arrival.row);
                     self.expect_open(instrument);
                 }
             }
@@ -255,6 +263,9 @@ impl<'d> Session<'d> {
             }
             EventKind::Timer => {}
         }
+        if !self.timetable.is_empty() {
+            self.venue.floors[instrument].begin(time, kind == EventKind::Trade);
+        }
         if self.venue.floors[instrument].is_quiet() { Ok(()) } else { self.settle(instrument) }
     }
 
@@ -264,22 +275,27 @@ impl<'d> Session<'d> {
         if !floor.by_bars() || floor.is_idle() {
             return;
         }
-        let Some(row) = self.feed.next_bar(instrument).filter(|row| self.expected[instrument] != Some(*row)) else { return };
+        let Some(row) = self.next_bar(instrument).filter(|row| self.expected[instrument] != Some(*row)) else { return };
         let Some(bar) = self.setup.histories[instrument].bars().get(row) else { return };
-        if floor.awaits_open(bar.open_at) {
+        let Some(opens_at) = self.opens_at(instrument, bar) else { return };
+        if self.venue.floors[instrument].awaits_open(opens_at) {
             self.expected[instrument] = Some(row);
-            self.agenda.put(bar.open_at, Phase::Opens, Due::Open(instrument));
+            self.agenda.put(opens_at, Phase::Opens, Due::Open(instrument));
         }
+    }
+
+    /// The row of the next bar of an instrument, which is not over yet.
+    pub(super) fn next_bar(&self, instrument: usize) -> Option<usize> {
+        self.feed.next_bar(instrument)
     }
 
     /// The next bar of an instrument opens.
     pub(super) fn open_bar(&mut self, instrument: usize) {
         let Some(row) = self.expected[instrument] else { return };
-        let bars = self.setup.histories[instrument].bars();
-        let first = ends_day(Some(bars[row].open_at), row.checked_sub(1).map_or(Timestamp::MIN, |k| bars[k].open_at));
+        let Some((bar, first)) = self.opening_bar(instrument, row) else { return };
         let floor = &mut self.venue.floors[instrument];
         floor.at_row(0, row);
-        floor.on_open(&bars[row], first);
+        floor.on_open(&bar, first);
     }
 
     /// Shows the strategy what became known, and sends what it asks for.
@@ -310,6 +326,7 @@ impl<'d> Session<'d> {
             increments: &self.setup.increments,
             ledger: &self.ledger,
             equity,
+            hours: self.timetable.each(),
         };
         (view, &mut self.orders)
     }
@@ -374,10 +391,4 @@ impl<'d> Session<'d> {
         let symbol = &self.setup.instruments[event.instrument].symbol;
         BacktestError::Money { place: format!("{symbol} at {}", event.time), error }
     }
-}
-
-/// Whether `next`, if anything, comes on another day of UTC than `this`.
-fn ends_day(next: Option<Timestamp>, this: Timestamp) -> bool {
-    const DAY: i64 = 86_400 * Timestamp::NANOS;
-    next.is_none_or(|next| next.0.div_euclid(DAY) != this.0.div_euclid(DAY))
 }

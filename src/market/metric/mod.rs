@@ -87,7 +87,8 @@ pub struct Counts {
     pub cancelled: usize,
     /// Orders that were under way when the data ended.
     pub unfilled: usize,
-    /// Orders the venue refused: post-only ones that would have taken, those to be filled whole that could not be.
+    /// Orders the venue refused: post-only ones that would have taken, those to be filled whole that could not be,
+    /// those that could not wait and came while the market was closed.
     pub refused_by_venue: usize,
     /// Orders whose time was over before they were filled whole.
     pub expired: usize,

@@ -77,10 +77,14 @@ fn gained(fit: &ChannelFit) -> String {
             format!("the held-out error of {channel} {moves}{by}, from {before} to {after} {unit} (noise floor {noise})")
         }
         [false, true] => {
-            format!("the held-out error of {channel} is {after} {unit} (noise floor {noise}); without, the run leaves all bounds")
+            format!(
+                "the held-out error of {channel} is {after} {unit} (noise floor {noise}); without, the run leaves all bounds"
+            )
         }
         [true, false] => {
-            format!("the held-out run of {channel} leaves all bounds; without, its error is {before} {unit} (noise floor {noise})")
+            format!(
+                "the held-out run of {channel} leaves all bounds; without, its error is {before} {unit} (noise floor {noise})"
+            )
         }
         [false, false] => format!("the held-out run of {channel} leaves all bounds, as it does without"),
     }
@@ -135,7 +139,10 @@ mod tests {
             improvement_ci95: [0.0; 2],
         };
         let said = |before, after| gained(&fit(before, after));
-        assert_eq!(said(2.0, 1.0), "the held-out error of position falls by 50 %, from 2.00 to 1.00 rad (noise floor 0.100)");
+        assert_eq!(
+            said(2.0, 1.0),
+            "the held-out error of position falls by 50 %, from 2.00 to 1.00 rad (noise floor 0.100)"
+        );
         for (before, after) in [(f64::NAN, 1.0), (1.0, f64::INFINITY), (f64::NAN, f64::NAN)] {
             let said = said(before, after);
             assert!(said.contains("leaves all bounds") && !said.contains("NaN") && !said.contains("inf"), "{said}");
