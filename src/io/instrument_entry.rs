@@ -65,3 +65,10 @@ pub(super) fn check_instruments(document: &Document, instruments: &[InstrumentEn
     }
     Ok(())
 }
+
+/// Holds the instruments of a twin to have no calendar.
+pub(super) fn refuse_calendars(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
+    let Some(index) = instruments.iter().position(|instrument| instrument.calendar.is_some()) else { return Ok(()) };
+    let error = document.error(&["instrument", &index.to_string(), "calendar"], "a twin has no use for a calendar");
+    Err(error.hint("leave it out: a recording says itself when orders were filled"))
+}

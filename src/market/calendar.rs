@@ -201,6 +201,12 @@ impl Calendar {
         self.holds_from
     }
 
+    /// The date in its zone at `time`.
+    #[must_use]
+    pub fn date_at(&self, time: Timestamp) -> NaiveDate {
+        local_date(self.zone, time)
+    }
+
     /// The holiday kept on `date`, by its name.
     #[must_use]
     pub fn holiday(&self, date: NaiveDate) -> Option<&str> {

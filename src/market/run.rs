@@ -1,5 +1,7 @@
 //! Runs: what a RUN.toml sets up, and what it leaves.
 
+use std::collections::BTreeMap;
+
 use chrono_tz::Tz;
 
 use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash, listed_mechanism};
@@ -8,8 +10,8 @@ use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 use super::run_calendar::ReadCalendars;
 use super::run_log::InputFile;
 use super::{
-    Backtest, BacktestError, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError, Provenance,
-    Record, Reference, RunOutputs, Settings, run_needs,
+    Backtest, BacktestError, Calendar, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError,
+    Provenance, Record, Reference, RunOutputs, Settings, run_needs,
 };
 
 /// A backtest as a run declares it, with its data read.
@@ -27,7 +29,7 @@ pub struct PreparedRun {
 ///
 /// # Errors
 /// Data of kinds no backtest runs on, instruments without data, data outside `start` and `end`; a `price` the data do not
-/// have; mechanisms, keys, units or values the registry does not know, or that need data there are none of; and what
+/// have; calendars that are not there or none; mechanisms, keys, units or values the registry does not know, or that need data there are none of; and what
 /// [`History::read_bars`] and [`History::read_quotes`] refuse.
 pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     // What needs no data is said before they are read.
@@ -55,6 +57,7 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
         mechanisms: venue.modelled().into_iter().map(str::to_owned).collect(),
         reference: backtest.settings().reference.unwrap_or_else(|| Reference::suiting(venue)),
         zone: zone(run),
+        calendars: calendar_names(run, &backtest),
         inputs,
     };
     Ok(PreparedRun { backtest, provenance, calendars })
@@ -95,6 +98,13 @@ impl PreparedRun {
     pub fn outputs(&self, record: &Record) -> Result<RunOutputs, MoneyError> {
         RunOutputs::new(self.provenance.clone(), &self.backtest, record)
     }
+}
+
+/// The name of each instrument's calendar, by its symbol.
+fn calendar_names(run: &RunFile, backtest: &Backtest) -> BTreeMap<String, String> {
+    let named = |calendar: &Calendar| calendar.name().to_owned();
+    let all = run.instruments.iter().zip(&backtest.settings().calendars);
+    all.filter_map(|(entry, calendar)| Some((entry.symbol.clone(), named(calendar.as_deref()?)))).collect()
 }
 
 /// The zone of the data's times, where they have one in common.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::io::{Document, InputError, RunFile, file_hash, hint_among};
+use crate::io::{Document, InputError, RunFile, did_you_mean, file_hash, listed};
 
 use super::Calendar;
 use super::run_log::InputFile;
@@ -52,9 +52,9 @@ impl ReadCalendars {
 
 fn unknown(run: &RunFile, index: usize, named: &str) -> InputError {
     let names: Vec<&str> = Calendar::names().collect();
-    let meant =
-        hint_among(named, &names).filter(|hint| hint.starts_with("did")).map(|hint| format!("{hint} ")).unwrap_or_default();
-    let there_are = names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-    let error = run.error(&["instrument", &index.to_string(), "calendar"], format!("there is no calendar `{named}`"));
-    error.hint(format!("{meant}there are {there_are}, and files of your own: \"./my_exchange.toml\""))
+    let hint = match did_you_mean(named, &names) {
+        Some(meant) => format!("did you mean `{meant}`?"),
+        None => format!("there are {}; a file of your own is named by its path: \"./my_exchange.toml\"", listed(&names)),
+    };
+    run.error(&["instrument", &index.to_string(), "calendar"], format!("there is no calendar `{named}`")).hint(hint)
 }

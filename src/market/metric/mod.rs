@@ -209,6 +209,9 @@ pub struct InstrumentSummary {
     pub fees: f64,
     /// Number of fills.
     pub fills: usize,
+    /// Rows from outside the sessions of its calendar, which no order met; none where it has no calendar.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rows_outside_sessions: Option<usize>,
 }
 
 impl InstrumentSummary {
@@ -224,6 +227,7 @@ impl InstrumentSummary {
                 unrealised: position.value().to_f64() - position.basis.to_f64(),
                 fees: position.fees.to_f64(),
                 fills: record.blotter.fills.iter().filter(|fill| fill.instrument == k).count(),
+                rows_outside_sessions: record.outside.get(k).copied().flatten(),
             })
             .collect()
     }
