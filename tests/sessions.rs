@@ -295,8 +295,8 @@ fn without_a_price_or_a_calendar_there_is_no_auction() {
 }
 
 #[test]
-fn a_crossed_quote_opens_nothing() {
-    let rows = [("13:00:00", 99.0, 101.0), ("13:30:00", 105.0, 103.0), ("13:30:02", 103.0, 105.0)];
+fn an_empty_quote_opens_nothing() {
+    let rows = [("13:00:00", 99.0, 101.0), ("13:30:00", 0.0, 0.0), ("13:30:02", 103.0, 105.0)];
     let rows = rows.map(|(time, bid, ask)| (at(&format!("2024-07-08T{time}Z")).0, bid, ask));
     let (record, _) = run_in("nyse", quotes(&rows), event(0).submit(order(OrderKind::MarketOnOpen)));
     assert_eq!(fills(&record), [(at("2024-07-08T13:30:02Z").0, 1.0, 105.0)]);

@@ -7,8 +7,8 @@ use super::backtest::BacktestError;
 use super::session::Session;
 use super::venue::{Outcome, Resting, What};
 use super::{
-    Cash, Condition, InFlight, Link, OpenOrder, Order, OrderId, OrderKind, Price, Quantity, Reason, Rejection, Request,
-    Role, Side, Status, Ticket, TimeInForce,
+    Cash, Condition, InFlight, Link, OpenOrder, Order, OrderId, Price, Quantity, Reason, Rejection, Request, Role, Side,
+    Status, Ticket, TimeInForce,
 };
 
 impl Session<'_> {
@@ -45,15 +45,8 @@ impl Session<'_> {
         if ticket.kind.prices().any(|price| price.0 <= 0 || !increments.on_tick(price)) {
             return Err(Reason::OffTick);
         }
-        let at_auction = matches!(
-            ticket.kind,
-            OrderKind::MarketOnOpen
-                | OrderKind::LimitOnOpen { .. }
-                | OrderKind::MarketOnClose
-                | OrderKind::LimitOnClose { .. }
-        );
         let hours = self.timetable.each().get(ticket.instrument).is_some_and(Option::is_some);
-        if at_auction && !hours && !self.venue.floors[ticket.instrument].by_bars() {
+        if ticket.kind.is_for_auction() && !hours && !self.venue.floors[ticket.instrument].by_bars() {
             return Err(Reason::NoAuction);
         }
         if let TimeInForce::GoodTillDate(end) = ticket.time_in_force

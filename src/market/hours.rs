@@ -145,9 +145,10 @@ impl Session<'_> {
             None => floor.close_doors(),
             Some(session) if hours.session.is_some_and(|before| before.open == session.open) => {}
             Some(session) => {
+                let goes_on = hours.session.is_some_and(|before| before.close == session.open);
                 hours.session = Some(session);
                 let first_of_day = hours.day_of(session).open == session.open;
-                floor.open_doors(first_of_day);
+                if goes_on { floor.go_on(first_of_day) } else { floor.open_doors(first_of_day) }
             }
         }
     }

@@ -103,7 +103,7 @@ impl<'d> Session<'d> {
         let count = setup.instruments.len();
         let timetable = Timetable::new(setup.settings.calendars.iter().map(Option::as_deref), count);
         for (k, _) in timetable.each().iter().enumerate().filter(|(_, hours)| hours.is_some()) {
-            venue.floors[k].auctions = Some(Auctions::new(!setup.histories[k].prints().is_empty()));
+            venue.floors[k].auctions = Some(Auctions::of(&setup.histories[k]));
         }
         Self {
             setup,

@@ -72,6 +72,12 @@ impl OrderKind {
         }
     }
 
+    /// Whether it takes part in an opening or a close, and in nothing else.
+    #[must_use]
+    pub fn is_for_auction(self) -> bool {
+        matches!(self, Self::MarketOnOpen | Self::LimitOnOpen { .. } | Self::MarketOnClose | Self::LimitOnClose { .. })
+    }
+
     /// The worst price it may trade at, where it has one.
     #[must_use]
     pub fn limit(self) -> Option<Price> {

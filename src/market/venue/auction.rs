@@ -14,7 +14,7 @@
 //!
 //! Source: NYSE rules 7.35A (core open) and 7.35B (closing auction), for what is approximated.
 
-use crate::market::{Book, OrderKind, Price, Quantity, Reason, Side, TimeInForce};
+use crate::market::{Book, History, OrderKind, Price, Quantity, Reason, Side, TimeInForce};
 use crate::sim2real::Timestamp;
 
 use super::floor::{Floor, Offer};
@@ -47,6 +47,8 @@ pub(in crate::market) struct Auctions {
     doors: Doors,
     /// Trades are known: the first of a day is its opening.
     by_trades: bool,
+    /// Quotes or a book are known: a trade alone does not say what there is to take.
+    displayed: bool,
     /// The opening of the day is still to come.
     to_open: bool,
     /// A price was shown in this session.
@@ -56,9 +58,11 @@ pub(in crate::market) struct Auctions {
 }
 
 impl Auctions {
-    /// Those of a floor whose market is closed yet.
-    pub fn new(by_trades: bool) -> Self {
-        Self { doors: Doors::Closed, by_trades, to_open: false, shown: false, last: None }
+    /// Those of a floor with such data, whose market is closed yet.
+    pub fn of(history: &History) -> Self {
+        let by_trades = !history.prints().is_empty();
+        let displayed = !(history.quotes().is_empty() && history.depth().is_empty() && history.order_events().is_empty());
+        Self { doors: Doors::Closed, by_trades, displayed, to_open: false, shown: false, last: None }
     }
 }
 
@@ -76,18 +80,27 @@ impl Floor {
         }
     }
 
-    /// A session begins. What was displayed before it is no price of it; a book that is told by its changes stays.
+    /// A session begins after a time in which the market was closed. What was displayed before it is no price of it; a book
+    /// that is told by its changes stays.
     pub fn open_doors(&mut self, first_of_day: bool) {
         let Some(auctions) = &mut self.auctions else { return };
         if self.by_bars {
             auctions.doors = Doors::Open;
             return;
         }
-        *auctions = Auctions { doors: Doors::Opening, to_open: first_of_day, ..Auctions::new(auctions.by_trades) };
+        (auctions.doors, auctions.shown) = (Doors::Opening, false);
+        (auctions.to_open, auctions.last) = (first_of_day, None);
         if !matches!(self.shown, Shown::Depth(_)) {
             self.shown = Shown::Nothing;
         }
         self.taken = Taken::default();
+    }
+
+    /// A session begins where the one before it ends, as days do in a market that never closes: what waits goes on waiting.
+    pub fn go_on(&mut self, first_of_day: bool) {
+        if let Some(auctions) = &mut self.auctions {
+            (auctions.to_open, auctions.last) = (first_of_day, None);
+        }
     }
 
     /// Order `k` arrives, and the market does not trade: it waits, or is over.
@@ -107,29 +120,31 @@ impl Floor {
 
     /// What the market shows has changed: if that is the first price of a session, orders that waited for it meet it.
     pub fn begin(&mut self, at: Timestamp, by_trade: bool) {
-        let Some(auctions) = self.auctions.filter(|auctions| auctions.doors == Doors::Opening) else { return };
-        // A trade says nothing new of a book that was left from before.
-        if !self.is_uncrossed() || (by_trade && matches!(self.shown, Shown::Depth(_))) {
+        let Some(auctions) = self.auctions else { return };
+        let (opens, to_hold) = (auctions.doors == Doors::Opening, auctions.to_open && !auctions.by_trades);
+        if auctions.doors == Doors::Closed || !(opens || to_hold) {
             return;
         }
-        let held = auctions.to_open && !auctions.by_trades;
-        self.auctions = Some(Auctions { doors: Doors::Open, to_open: auctions.to_open && !held, shown: true, ..auctions });
-        if held {
+        if (by_trade && auctions.displayed) || !self.shows_price() {
+            return;
+        }
+        let to_open = auctions.to_open && !to_hold;
+        self.auctions = Some(Auctions { doors: Doors::Open, shown: true, to_open, ..auctions });
+        if to_hold {
             self.open_at(at, None);
         }
-        for k in 0..self.resting.len() {
-            self.resting[k].place = Place::default();
-            self.meet_shown(k, at);
+        if opens {
+            for k in 0..self.resting.len() {
+                self.resting[k].place = Place::default();
+                self.meet_shown(k, at);
+            }
         }
         self.sweep(at);
     }
 
-    /// Whether a price is displayed, and no bid above the ask.
-    fn is_uncrossed(&self) -> bool {
-        match (self.shown.touch(Side::Buy), self.shown.touch(Side::Sell)) {
-            (Some(ask), Some(bid)) => bid <= ask,
-            (ask, bid) => ask.or(bid).is_some(),
-        }
+    /// Whether a price is displayed. None are crossed: histories refuse such quotes, and books settle.
+    fn shows_price(&self) -> bool {
+        [Side::Buy, Side::Sell].into_iter().any(|side| self.shown.touch(side).is_some())
     }
 
     /// A trade is printed, in a session or out of it: the first of a day is its opening.
