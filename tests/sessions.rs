@@ -334,3 +334,25 @@ fn a_strategy_knows_when_its_session_closes() {
     let backtest = Backtest::new(vec![instrument("A")], vec![around(&rows)], venue(&[]), plain).unwrap();
     assert_eq!(fills(&backtest.run(&mut FlatByClose).unwrap()), [], "without a calendar nobody knows");
 }
+
+#[test]
+fn a_maker_is_flat_before_the_close_of_a_half_day() {
+    let first = at("2024-11-29T14:30:00Z").0;
+    let rows: Vec<_> = (0..14_000).map(|k| {
+        let wave = (f64::from(k) / 300.0).sin().mul_add(1.0, 100.0);
+        let bid = (wave * 100.0).round() / 100.0;
+        (first + i64::from(k) * Timestamp::NANOS, bid, bid + 0.02)
+    });
+    let history = quotes(&rows.collect::<Vec<_>>());
+    let table: toml::Table = toml::from_str(include_str!("../strategies/market_making.toml")).unwrap();
+    let strategy = table["strategy"].as_table().unwrap();
+    let held_at_the_end = |settings: Settings| {
+        let backtest = Backtest::new(vec![instrument("A")], vec![history.clone()], venue(&[]), settings).unwrap();
+        let record = backtest.run(trueup::strategies::build(strategy).unwrap().as_mut()).unwrap();
+        assert!(record.blotter.fills.len() > 10, "{} fills", record.blotter.fills.len());
+        let last = record.blotter.fills.last().unwrap().filled_at;
+        (record.ledger.is_flat(), last <= at("2024-11-29T17:55:05Z"))
+    };
+    assert_eq!(held_at_the_end(keeping("nyse")), (true, true));
+    assert!(!held_at_the_end(settings()).1, "without a calendar it goes on");
+}
