@@ -15,7 +15,9 @@ pub use avellaneda_stoikov::{AvellanedaStoikov, Parameters as Quoting, TwoSided}
 /// has gone `step` ticks or more from it. Time runs from the first event in spans of `horizon`, at the end of each of which no
 /// risk is left, and then anew.
 ///
-/// Quotes are post-only: they never take. Where a side would add to a full inventory it is not quoted.
+/// Quotes are post-only: they never take. Where a side would add to a full inventory it is not quoted. Where the instrument has
+/// a calendar, nothing is held over night: from `flat_before_close` on quotes are taken back, and what is held is sold or
+/// bought back at the market.
 #[derive(Debug, Clone)]
 pub struct MarketMaking {
     parameters: Parameters,
@@ -29,7 +31,7 @@ pub(super) const KIND: Kind = Kind {
     name: "market_making",
     about: "quotes both sides about what one more unit is worth, as Avellaneda and Stoikov have it",
     example: include_str!("market_making.toml"),
-    parameters: &["gamma", "kappa", "sigma", "max_inventory", "size", "horizon", "step"],
+    parameters: &["gamma", "kappa", "sigma", "max_inventory", "size", "horizon", "step", "flat_before_close"],
     instruments: 1,
     build: |parameters| Ok(Box::new(MarketMaking::new(read(&KIND, parameters)?)?)),
 };
@@ -53,6 +55,9 @@ pub struct Parameters {
     /// How many ticks the best price may go from a quote before that is moved.
     #[serde(default = "one")]
     pub step: u32,
+    /// How long before the close of a session nothing is quoted and nothing held [s]; none to hold over night, as without a
+    /// calendar.
+    pub flat_before_close: Option<f64>,
 }
 
 fn one() -> u32 {
@@ -65,12 +70,13 @@ impl MarketMaking {
     /// # Errors
     /// If a parameter is not a number above 0.
     pub fn new(parameters: Parameters) -> Result<Self, StrategyError> {
-        let Parameters { gamma, kappa, sigma, max_inventory, size, horizon, step } = parameters;
+        let Parameters { gamma, kappa, sigma, max_inventory, size, horizon, step, flat_before_close } = parameters;
         let formula = AvellanedaStoikov::new(&KIND, Quoting { gamma, kappa, sigma, max_inventory })?;
         for (parameter, value, hint) in [
             ("size", size, "it is a number of units above 0"),
             ("horizon", horizon, "it is a time in seconds above 0, such as 3600"),
             ("step", f64::from(step), "it is a number of ticks, at least 1"),
+            ("flat_before_close", flat_before_close.unwrap_or(1.0), "it is a time in seconds above 0, such as 300"),
         ] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(StrategyError::Value { kind: KIND.name, parameter, value: value.to_string(), hint });
@@ -84,6 +90,21 @@ impl MarketMaking {
         let began = *self.began.get_or_insert(now);
         let horizon = self.parameters.horizon;
         horizon - now.seconds_since(began).max(0.0) % horizon
+    }
+
+    /// Whether the session of an instrument closes so soon that it is to be flat.
+    fn closes_soon(&self, view: &View<'_>, instrument: usize) -> bool {
+        let session = self.parameters.flat_before_close.zip(view.session(instrument));
+        session.is_some_and(|(seconds, session)| session.close.seconds_since(view.now()) <= seconds)
+    }
+
+    /// Takes quotes back, and closes what is held once none of them works.
+    fn flatten(&self, view: &View<'_>, instrument: usize, orders: &mut Orders) {
+        let quotes = || view.orders(instrument).iter().filter(|order| self.own[instrument].contains(&Some(order.id)));
+        quotes().for_each(|order| orders.cancel(order.id));
+        if quotes().next().is_none() {
+            orders.to_position(view, instrument, Quantity::ZERO);
+        }
     }
 
     /// Sees to the quote on one side, which is best at `price`; none for no quote.
@@ -130,6 +151,9 @@ impl Strategy for MarketMaking {
         let Event { time, instrument, kind } = view.event();
         let Some(price) = view.price(instrument).filter(|_| kind != EventKind::Timer) else { return };
         self.own.resize(view.instruments().len(), [None; 2]);
+        if self.closes_soon(view, instrument) {
+            return self.flatten(view, instrument, orders);
+        }
         let left = self.left(time);
         let quotes = self.formula.quotes(price.to_f64(), view.position(instrument).to_f64(), left);
         self.quote(view, instrument, Side::Buy, quotes.bid, orders);

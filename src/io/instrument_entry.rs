@@ -22,6 +22,17 @@ pub struct InstrumentEntry {
     pub average_daily_volume: Option<f64>,
     /// Standard deviation of the daily return (a fraction).
     pub daily_volatility: Option<f64>,
+    /// When its market is open: the name of a calendar that comes with the program, or the path of a TOML table. Runs alone
+    /// know it.
+    pub calendar: Option<String>,
+}
+
+impl InstrumentEntry {
+    /// The file of its calendar, as the document names it; none where it has no calendar, or one that goes by name.
+    #[must_use]
+    pub fn calendar_file(&self) -> Option<&str> {
+        self.calendar.as_deref().filter(|named| named.ends_with(".toml") || named.contains(['/', '\\']))
+    }
 }
 
 fn one() -> f64 {
@@ -53,4 +64,11 @@ pub(super) fn check_instruments(document: &Document, instruments: &[InstrumentEn
         }
     }
     Ok(())
+}
+
+/// Holds the instruments of a twin to have no calendar.
+pub(super) fn refuse_calendars(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
+    let Some(index) = instruments.iter().position(|instrument| instrument.calendar.is_some()) else { return Ok(()) };
+    let error = document.error(&["instrument", &index.to_string(), "calendar"], "a twin has no use for a calendar");
+    Err(error.hint("leave it out: a recording says itself when orders were filled"))
 }

@@ -148,6 +148,11 @@ impl RunFile {
                 check_file(&run.document, &["data", &number, "snapshot"], &snapshot.to_string_lossy())?;
             }
         }
+        for (index, instrument) in run.instruments.iter().enumerate() {
+            if let Some(named) = instrument.calendar_file() {
+                check_file(&run.document, &["instrument", &index.to_string(), "calendar"], named)?;
+            }
+        }
         let resolved = |data: DataEntry| {
             let snapshot = data.format.snapshot.as_ref().map(|path| run.document.resolve(path));
             DataEntry { path: run.document.resolve(&data.path), format: FeedFormat { snapshot, ..data.format }, ..data }

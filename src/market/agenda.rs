@@ -17,6 +17,8 @@ pub(super) enum Phase {
     Before,
     /// The data themselves.
     Data,
+    /// The auction at the close of a day of trading: what the instant brought counts, what comes later does not.
+    Closes,
     /// What ends with the instant.
     Ends,
     /// Messages that took no time.
@@ -38,6 +40,8 @@ pub(super) enum Due {
     Replace(OrderId, Option<Quantity>, Option<Price>),
     /// A bar of an instrument opens.
     Open(usize),
+    /// The day of trading of an instrument closes.
+    Close(usize),
     /// An order's time is over.
     Expire(OrderId),
     /// What became of an order is known to its owner: the place of the notice.

@@ -1,12 +1,14 @@
 //! The backtest: what it is set up of, and what it leaves. Its loop is a [`Session`].
 
+use std::sync::Arc;
+
 use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
 use super::line::{Line, RowKind};
 use super::{
-    Cash, DataNotes, Execution, Feed, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError,
-    Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy, StreamError,
+    Calendar, Cash, DataNotes, Execution, Feed, History, Increments, Instrument, Latencies, LatencyError, Ledger,
+    LedgerError, Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy, StreamError,
 };
 
 /// A backtest, as it was set up.
@@ -37,15 +39,18 @@ pub struct Settings {
     pub latencies: Latencies,
     /// Time for which the equity curve keeps its first, lowest, highest and last point alone [ns]; none to keep one an event.
     pub equity_every: Option<i64>,
+    /// When the market of each instrument is open, in their order. Instruments without a calendar, as those behind the last
+    /// here, trade whenever there are data, in days of UTC.
+    pub calendars: Vec<Option<Arc<Calendar>>>,
 }
 
 impl Settings {
     /// No borrowing: the sum of positions stays within the equity.
     #[must_use]
     pub fn with_cash(cash: Cash) -> Self {
-        let (matching, latencies) = Default::default();
+        let (matching, latencies, calendars) = Default::default();
         let (seed, max_leverage, reference, equity_every) = (Seed::default(), 1.0, None, None);
-        Self { cash, seed, max_leverage, reference, matching, latencies, equity_every }
+        Self { cash, seed, max_leverage, reference, matching, latencies, equity_every, calendars }
     }
 }
 
@@ -62,6 +67,16 @@ pub enum BacktestError {
         instruments: usize,
         /// Number of histories.
         histories: usize,
+    },
+    /// Calendars of instruments that are not there.
+    #[error(
+        "there are {instruments} instruments and calendars for {calendars}\nhint: give calendars in the order of the instruments"
+    )]
+    Calendars {
+        /// Number of instruments.
+        instruments: usize,
+        /// Number of calendars.
+        calendars: usize,
     },
     /// A leverage that cannot be.
     #[error("max_leverage is {0}\nhint: it is a number above 0; 1 borrows nothing")]
@@ -147,6 +162,9 @@ pub struct Record {
     pub held: Held,
     /// What the data were, one an instrument.
     pub data: Vec<DataSeen>,
+    /// Of each instrument, rows from outside the sessions of its calendar, which no order met; none where it has no calendar,
+    /// and nothing at all where no instrument has one.
+    pub outside: Vec<Option<usize>>,
 }
 
 /// What the data of an instrument were.
@@ -210,6 +228,10 @@ impl Backtest {
         venue: Assembly<Execution>,
         settings: Settings,
     ) -> Result<Self, BacktestError> {
+        if settings.calendars.len() > instruments.len() {
+            let (instruments, calendars) = (instruments.len(), settings.calendars.len());
+            return Err(BacktestError::Calendars { instruments, calendars });
+        }
         if !settings.max_leverage.is_finite() || settings.max_leverage <= 0.0 {
             return Err(BacktestError::Leverage(settings.max_leverage));
         }

@@ -41,7 +41,7 @@ impl Session<'_> {
 
     /// Sends word of what became of an order.
     pub(super) fn pend(&mut self, outcome: Outcome, terms: &[f64]) {
-        let at = self.clocks.response(outcome.at);
+        let at = self.clocks.response(outcome.at).max(self.timetable.known_from);
         let place = self.mail.put(outcome, terms);
         self.agenda.put(at, Phase::Notices, Due::Notice(place));
     }

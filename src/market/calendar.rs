@@ -201,6 +201,12 @@ impl Calendar {
         self.holds_from
     }
 
+    /// The date in its zone at `time`.
+    #[must_use]
+    pub fn date_at(&self, time: Timestamp) -> NaiveDate {
+        local_date(self.zone, time)
+    }
+
     /// The holiday kept on `date`, by its name.
     #[must_use]
     pub fn holiday(&self, date: NaiveDate) -> Option<&str> {
@@ -214,6 +220,17 @@ impl Calendar {
         let shorter = if any { self.shorter(date) } else { None };
         let of_date = self.weekly.iter().filter(move |session| any && session.belongs_to(date));
         of_date.filter_map(move |session| session.hours(date, self.zone, shorter))
+    }
+
+    /// The day of trading of `date`: from the open of its first session to the close of its last, breaks between them
+    /// included.
+    #[must_use]
+    pub fn day(&self, date: NaiveDate) -> Option<Hours> {
+        self.sessions_on(date).reduce(|day, session| Hours {
+            close: session.close,
+            half_day: day.half_day || session.half_day,
+            ..day
+        })
     }
 
     /// What shortens the sessions of `date`: of several half days, the latest open and the earliest close.

@@ -24,7 +24,8 @@ impl Carry {
 }
 
 impl Session<'_> {
-    /// Charges all positions once a day of UTC, at the first event of the next.
+    /// Charges all positions once a day of UTC, at the first event of the next. So it is with exchange calendars too: what is
+    /// charged goes by the time held, over nights and weekends, and not by when it is booked.
     #[inline]
     pub(super) fn carry_over(&mut self, now: Timestamp) -> Result<(), BacktestError> {
         if now < self.carry.next || !self.venue.charges {

@@ -7,12 +7,9 @@ use super::backtest::BacktestError;
 use super::session::Session;
 use super::venue::{Outcome, Resting, What};
 use super::{
-    Cash, Condition, InFlight, Link, OpenOrder, Order, OrderId, OrderKind, Price, Quantity, Reason, Rejection, Request,
-    Role, Side, Status, Ticket, TimeInForce,
+    Cash, Condition, InFlight, Link, OpenOrder, Order, OrderId, Price, Quantity, Reason, Rejection, Request, Role, Side,
+    Status, Ticket, TimeInForce,
 };
-
-/// Length of a day of UTC [ns].
-const DAY: i64 = 86_400 * Timestamp::NANOS;
 
 impl Session<'_> {
     /// Sends what the strategy asked for, or refuses it.
@@ -48,14 +45,8 @@ impl Session<'_> {
         if ticket.kind.prices().any(|price| price.0 <= 0 || !increments.on_tick(price)) {
             return Err(Reason::OffTick);
         }
-        let at_auction = matches!(
-            ticket.kind,
-            OrderKind::MarketOnOpen
-                | OrderKind::LimitOnOpen { .. }
-                | OrderKind::MarketOnClose
-                | OrderKind::LimitOnClose { .. }
-        );
-        if at_auction && !self.venue.floors[ticket.instrument].by_bars() {
+        let hours = self.timetable.each().get(ticket.instrument).is_some_and(Option::is_some);
+        if ticket.kind.is_for_auction() && !hours && !self.venue.floors[ticket.instrument].by_bars() {
             return Err(Reason::NoAuction);
         }
         if let TimeInForce::GoodTillDate(end) = ticket.time_in_force
@@ -148,8 +139,9 @@ impl Session<'_> {
         match time_in_force {
             TimeInForce::GoodTillDate(end) => self.agenda.put(end, Phase::Before, Due::Expire(id)),
             TimeInForce::Day => {
-                let end = (order.arrives_at.0.div_euclid(DAY) + 1).saturating_mul(DAY);
-                self.agenda.put(Timestamp(end), Phase::Ends, Due::Expire(id));
+                if let Some(end) = self.day_ends(instrument, order.arrives_at) {
+                    self.agenda.put(end, Phase::Ends, Due::Expire(id));
+                }
             }
             _ => {}
         }
@@ -170,10 +162,20 @@ impl Session<'_> {
         let instrument = match due {
             Due::Arrive(id) => self.arrive(id, at),
             Due::Cancel(id) => self.withdraw(id, at, Reason::Asked),
-            Due::Expire(id) => self.withdraw(id, at, Reason::TimeInForce),
+            Due::Expire(id) => match self.works_till(id, at) {
+                Some(end) => {
+                    self.agenda.put(end, Phase::Ends, Due::Expire(id));
+                    None
+                }
+                None => self.withdraw(id, at, Reason::TimeInForce),
+            },
             Due::Replace(id, quantity, price) => self.amend(id, quantity, price, at),
             Due::Open(instrument) => {
                 self.open_bar(instrument);
+                Some(instrument)
+            }
+            Due::Close(instrument) => {
+                self.close_day(instrument, at);
                 Some(instrument)
             }
             Due::Notice(_) | Due::Wake => None,
@@ -195,8 +197,10 @@ impl Session<'_> {
         let ids: Vec<OrderId> = self.sent.values().filter(|(_, other)| together(other)).map(|(_, other)| other.id).collect();
         let orders: Vec<Resting> = ids.iter().filter_map(|id| self.sent.remove(id)).map(|(_, order)| order).collect();
         let orders = orders.into_iter().map(|order| order.arriving(at)).collect();
+        self.keep_hours(instrument, at);
         self.venue.floors[instrument].arrive(orders, at);
         self.expect_open(instrument);
+        self.expect_close(instrument, at);
         Some(instrument)
     }
 
@@ -236,6 +240,7 @@ impl Session<'_> {
             self.refuse(Reason::OffTick);
             return None;
         }
+        self.keep_hours(instrument, at);
         let there = self.venue.floors[instrument].replace(id, quantity, price, at);
         if !there {
             self.refuse(Reason::UnknownOrder);

@@ -24,6 +24,7 @@ mod feed;
 mod history;
 #[cfg(feature = "io")]
 mod history_file;
+mod hours;
 pub mod indicator;
 mod instrument;
 mod known;
@@ -47,6 +48,8 @@ mod reason;
 mod row_check;
 #[cfg(feature = "io")]
 mod run;
+#[cfg(feature = "io")]
+mod run_calendar;
 #[cfg(feature = "io")]
 mod run_figures;
 #[cfg(feature = "io")]

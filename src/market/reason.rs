@@ -20,8 +20,11 @@ pub enum Reason {
     NoPrice,
     /// It would take what is held beyond the run's largest leverage.
     Leverage,
-    /// It is for the open or the close, and the data tell neither: bars do, quotes do not.
+    /// It is for the open or the close, and nothing tells what that was: neither bars nor a calendar, or no price was
+    /// known at it.
     NoAuction,
+    /// It could not wait, and came while the market was closed.
+    MarketClosed,
     /// Its time was over before it was sent.
     Late,
     /// It is linked with orders of another instrument, or with none.
@@ -58,6 +61,7 @@ impl Reason {
             Self::NoPrice => "no_price",
             Self::Leverage => "leverage",
             Self::NoAuction => "no_auction",
+            Self::MarketClosed => "market_closed",
             Self::Late => "late",
             Self::Unlinked => "unlinked",
             Self::UnknownOrder => "unknown_order",
@@ -83,6 +87,7 @@ impl fmt::Display for Reason {
             Self::NoPrice => "the instrument has had no price yet",
             Self::Leverage => "it would exceed the run's largest leverage",
             Self::NoAuction => "it is for the open or the close, which its data do not tell",
+            Self::MarketClosed => "it could not wait, and came while the market was closed",
             Self::Late => "its time was over before it was sent",
             Self::Unlinked => "it is linked with no order of its instrument",
             Self::UnknownOrder => "no order of that number works",

@@ -1,14 +1,17 @@
 //! Runs: what a RUN.toml sets up, and what it leaves.
 
+use std::collections::BTreeMap;
+
 use chrono_tz::Tz;
 
 use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash, listed_mechanism};
 use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 
+use super::run_calendar::ReadCalendars;
 use super::run_log::InputFile;
 use super::{
-    Backtest, BacktestError, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError, Provenance,
-    Record, Reference, RunOutputs, Settings, StreamError, run_needs,
+    Backtest, BacktestError, Calendar, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError,
+    Provenance, Record, Reference, RunOutputs, Settings, StreamError, run_needs,
 };
 
 /// A backtest as a run declares it, with its data read.
@@ -20,6 +23,7 @@ pub struct PreparedRun {
     pub provenance: Provenance,
     /// The run whose files are read while it goes; none where its data are in memory.
     pub(super) streamed: Option<Box<RunFile>>,
+    pub(super) calendars: ReadCalendars,
 }
 
 /// Sets up the backtest of `run`, and reads its data. The strategy is for the caller to build, from `run.strategy` and
@@ -27,12 +31,14 @@ pub struct PreparedRun {
 ///
 /// # Errors
 /// Data of kinds no backtest runs on, instruments without data, data outside `start` and `end`; a `price` the data do not
-/// have; mechanisms, keys, units or values the registry does not know, or that need data there are none of; and what
+/// have; calendars that are not there or none; mechanisms, keys, units or values the registry does not know, or that need data there are none of; and what
 /// [`History::read_bars`] and [`History::read_quotes`] refuse.
 pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     // What needs no data is said before they are read.
     venue(run)?;
-    let (mut inputs, mut read) = (Vec::new(), Vec::new());
+    let mut calendars = ReadCalendars::default();
+    calendars.of(run)?;
+    let (mut inputs, mut read) = (calendars.files.clone(), Vec::new());
     for entry in &run.data {
         let history = history(entry)?;
         let rows = history.rows();
@@ -41,8 +47,8 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     }
     let joined = run.instruments.iter().enumerate().map(|(index, entry)| joined(run, index, &entry.symbol, &mut read));
     let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
-    let backtest = set_up(run, histories)?;
-    Ok(PreparedRun { provenance: provenance(run, &backtest, inputs)?, backtest, streamed: None })
+    let backtest = set_up(run, histories, &mut calendars)?;
+    Ok(PreparedRun { provenance: provenance(run, &backtest, inputs)?, backtest, streamed: None, calendars })
 }
 
 /// What `backtest`, that of `run`, is made of: its document and `files`.
@@ -56,21 +62,22 @@ pub(super) fn provenance(run: &RunFile, backtest: &Backtest, files: Vec<InputFil
         mechanisms: venue.modelled().into_iter().map(str::to_owned).collect(),
         reference: backtest.settings().reference.unwrap_or_else(|| Reference::suiting(venue)),
         zone: zone(run),
+        calendars: calendar_names(run, backtest),
         inputs: [own_document(run)?].into_iter().chain(files).collect(),
     })
 }
 
 /// The backtest of `run` on data that were read.
-fn set_up(run: &RunFile, histories: Vec<History>) -> Result<Backtest, InputError> {
+fn set_up(run: &RunFile, histories: Vec<History>, calendars: &mut ReadCalendars) -> Result<Backtest, InputError> {
     let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     let venue = venue(run)?;
     run_needs::check(run, &venue, &instruments, &histories)?;
-    let settings = settings(run, &histories)?;
+    let settings = settings(run, &histories, calendars)?;
     Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))
 }
 
 /// What else the backtest of `run` depends on.
-pub(super) fn settings(run: &RunFile, histories: &[History]) -> Result<Settings, InputError> {
+pub(super) fn settings(run: &RunFile, histories: &[History], calendars: &mut ReadCalendars) -> Result<Settings, InputError> {
     let cash = Cash::nearest(run.run.cash).map_err(|error| money(run, &["run", "cash"], &error))?;
     let borrowing_nothing = Settings::with_cash(cash);
     Ok(Settings {
@@ -81,6 +88,7 @@ pub(super) fn settings(run: &RunFile, histories: &[History]) -> Result<Settings,
         matching: run.matching::<Matching>()?,
         latencies: run.latency::<Latencies>()?,
         equity_every: run.run.equity_every.or(run.run.stream.then_some(60 * Timestamp::NANOS)),
+        calendars: calendars.of(run)?,
     })
 }
 
@@ -90,7 +98,7 @@ impl PreparedRun {
     /// # Errors
     /// As [`prepare_run`], but for what it says of files.
     pub fn variant(&self, run: &RunFile) -> Result<Backtest, InputError> {
-        set_up(run, self.backtest.histories().to_vec())
+        set_up(run, self.backtest.histories().to_vec(), &mut self.calendars.clone())
     }
 
     /// All that `record`, the record of this backtest, is shown as.
@@ -101,7 +109,8 @@ impl PreparedRun {
         let mut provenance = self.provenance.clone();
         if let Some(run) = &self.streamed {
             // Only now is known how many rows the files have.
-            for (entry, file) in run.data.iter().zip(provenance.inputs.iter_mut().skip(1)) {
+            let files = 1 + self.calendars.files.len();
+            for (entry, file) in run.data.iter().zip(provenance.inputs.iter_mut().skip(files)) {
                 let instrument = run.instruments.iter().position(|instrument| instrument.symbol == entry.symbol);
                 let seen = instrument.and_then(|k| record.data.get(k));
                 let notes = seen.and_then(|seen| seen.notes.iter().find(|notes| notes.what() == entry.kind.word()));
@@ -110,6 +119,13 @@ impl PreparedRun {
         }
         RunOutputs::new(provenance, &self.backtest, record)
     }
+}
+
+/// The name of each instrument's calendar, by its symbol.
+fn calendar_names(run: &RunFile, backtest: &Backtest) -> BTreeMap<String, String> {
+    let named = |calendar: &Calendar| calendar.name().to_owned();
+    let all = run.instruments.iter().zip(&backtest.settings().calendars);
+    all.filter_map(|(entry, calendar)| Some((entry.symbol.clone(), named(calendar.as_deref()?)))).collect()
 }
 
 /// The zone of the data's times, where they have one in common.

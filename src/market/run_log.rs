@@ -1,5 +1,7 @@
 //! What a backtest leaves on disk: its summary, and its orders, fills and equity in the form of an execution log.
 
+use std::collections::BTreeMap;
+
 use chrono_tz::Tz;
 use serde::{Serialize, Serializer};
 
@@ -39,6 +41,9 @@ pub struct Provenance {
     /// The zone months are counted in: that of the data's times, UTC where they differ.
     #[serde(serialize_with = "zone_name")]
     pub zone: Tz,
+    /// The calendar of each instrument that has one, by its symbol.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub calendars: BTreeMap<String, String>,
     /// Every file it read.
     pub inputs: Vec<InputFile>,
 }

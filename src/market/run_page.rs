@@ -1,5 +1,7 @@
 //! A backtest as its report shows it.
 
+use std::sync::Arc;
+
 use chrono::DateTime;
 
 use crate::report::quantity::{UNDEFINED, fine, number, with_unit};
@@ -8,7 +10,7 @@ use crate::sim2real::{Parameter, Simulator, Timestamp};
 
 use super::metric::{Drawdown, Metrics, Month, RoundTrip};
 use super::run_figures::{figure_groups, key_figures};
-use super::{Backtest, DataSeen, EquityPoint, Record, Reference, RunSummary};
+use super::{Backtest, Calendar, DataSeen, EquityPoint, Record, Reference, RunSummary};
 
 /// Fills a page is given: it lists no more.
 const FILLS: usize = 200;
@@ -30,7 +32,7 @@ pub(super) fn run_page(summary: &RunSummary, backtest: &Backtest, record: &Recor
         fills: record.blotter.fills.iter().take(FILLS).map(|fill| shown(backtest, fill)).collect(),
         fill_count: record.blotter.fills.len(),
         costs: costs(&summary.metrics),
-        in_force: in_force(summary, backtest, &record.data),
+        in_force: in_force(summary, backtest, record),
         inputs: inputs(summary),
     }
 }
@@ -171,7 +173,7 @@ fn matched(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec<
     all
 }
 
-fn in_force(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec<InForce> {
+fn in_force(summary: &RunSummary, backtest: &Backtest, record: &Record) -> Vec<InForce> {
     let venue = backtest.venue();
     let currency = &summary.provenance.currency;
     let setting = |p: &Parameter| {
@@ -185,6 +187,7 @@ fn in_force(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec
         setting: parameters.iter().map(setting).collect::<Vec<_>>().join(", "),
     };
     let mut all: Vec<InForce> = venue.mechanisms().map(|(row, _, p)| mechanism(row.about().name, p)).collect();
+    let data = &record.data;
     let quoted = data.iter().filter(|seen| seen.quoted).count();
     let from_quotes = match summary.provenance.reference {
         Reference::Mid => "from the mid of the quotes an order meets",
@@ -197,7 +200,8 @@ fn in_force(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec
     };
     let assumption = |name: &str, setting: String| InForce { name: name.to_owned(), setting };
     all.push(assumption("market orders", fills));
-    all.extend(matched(summary, backtest, data).into_iter().map(|(name, setting)| assumption(name, setting)));
+    all.extend(matched(summary, backtest, &record.data).into_iter().map(|(name, setting)| assumption(name, setting)));
+    all.extend(hours(backtest, record).into_iter().map(|(name, setting)| assumption(&name, setting)));
     all.push(assumption("largest leverage", format!("{} times the equity", number(backtest.settings().max_leverage))));
     all.push(assumption("market", "the past does not react to what the backtest trades".to_owned()));
     for file in &summary.data {
@@ -211,6 +215,28 @@ fn in_force(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec
         )),
     }
     all
+}
+
+/// When the market of each instrument was open, how many rows that leaves out, and since when its calendar holds.
+fn hours(backtest: &Backtest, record: &Record) -> Vec<(String, String)> {
+    let first = record.equity.first().map(|point| point.time);
+    let all = backtest.instruments().iter().zip(&backtest.settings().calendars).enumerate();
+    let one = |(k, (instrument, calendar)): (usize, (&super::Instrument, &Option<Arc<Calendar>>))| {
+        let calendar = calendar.as_deref()?;
+        let rows = match record.outside.get(k).copied().flatten().unwrap_or_default() {
+            0 => "no row is from outside its sessions".to_owned(),
+            1 => "1 row is from outside its sessions, and no order met it".to_owned(),
+            n => format!("{n} rows are from outside its sessions, and no order met them"),
+        };
+        let begins = first.map(|time| calendar.date_at(time));
+        let early = calendar.holds_from().zip(begins).filter(|(from, begins)| begins < from);
+        let since = early.map(|(from, _)| format!("; its rules hold from {from}, and are followed before it all the same"));
+        Some((
+            format!("hours of {}", instrument.symbol),
+            format!("{}: {rows}{}", calendar.name(), since.unwrap_or_default()),
+        ))
+    };
+    all.filter_map(one).collect()
 }
 
 fn inputs(summary: &RunSummary) -> Vec<Input> {

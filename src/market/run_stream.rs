@@ -5,6 +5,7 @@ use crate::sim2real::Timestamp;
 
 use super::line::Line;
 use super::run::{no_data, provenance, settings, span, venue};
+use super::run_calendar::ReadCalendars;
 use super::run_log::InputFile;
 use super::stream::{Between, Dated, Stream, StreamError};
 use super::{Backtest, BacktestError, FileStream, History, Instrument, PreparedRun, Session, Sources, run_needs};
@@ -20,14 +21,21 @@ pub fn prepare_streaming_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     let begun = begun.collect::<Result<Vec<History>, StreamError>>().map_err(|error| input(run, error))?;
     let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     run_needs::check(run, &venue, &instruments, &begun)?;
-    let settings = settings(run, &begun)?;
+    let mut calendars = ReadCalendars::default();
+    let settings = settings(run, &begun, &mut calendars)?;
     let files = run
         .data
         .iter()
         .map(|entry| Ok(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: None }));
-    let files = files.collect::<Result<_, InputError>>()?;
+    let data = files.collect::<Result<Vec<InputFile>, InputError>>()?;
+    let files = calendars.files.iter().cloned().chain(data).collect();
     let backtest = Backtest::streaming(instruments, venue, settings).map_err(|error| super::explained(run, &error))?;
-    Ok(PreparedRun { provenance: provenance(run, &backtest, files)?, backtest, streamed: Some(Box::new(run.clone())) })
+    Ok(PreparedRun {
+        provenance: provenance(run, &backtest, files)?,
+        backtest,
+        streamed: Some(Box::new(run.clone())),
+        calendars,
+    })
 }
 
 impl PreparedRun {

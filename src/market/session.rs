@@ -10,12 +10,13 @@ use super::backtest::{Backtest, BacktestError, Held, Record, Settings};
 use super::blotter::Blotter;
 use super::carry::Carry;
 use super::equity_curve::EquityCurve;
+use super::hours::Timetable;
 use super::known::Known;
 use super::latency::Clocks;
 use super::line::{Line, RowKind};
 use super::mail::Mail;
 use super::transit::Transit;
-use super::venue::{Detail, Outcome, Resting, Rules, Setup, Venue};
+use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{
     Arrival, Cash, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, MoneyError, OrderId, Orders, Price,
     Reference, Strategy, View,
@@ -24,7 +25,7 @@ use super::{
 /// A backtest under way.
 pub struct Session<'d> {
     pub(super) setup: &'d Backtest,
-    feed: Feed<'d>,
+    pub(super) feed: Feed<'d>,
     transit: Transit,
     /// Trades value what is held: there is nothing else that could.
     trades_mark: Vec<bool>,
@@ -32,6 +33,7 @@ pub struct Session<'d> {
     direct: bool,
     pub(super) agenda: Agenda,
     pub(super) clocks: Clocks,
+    pub(super) timetable: Timetable<'d>,
     pub(super) known: Vec<Known>,
     pub(super) daily: Vec<Daily>,
     pub(super) venue: Venue,
@@ -101,9 +103,13 @@ impl<'d> Session<'d> {
             rules: Rules { reference, intrabar, limit_fill, queue, origin },
             seed,
         };
-        let venue = Venue::new(&setup.venue, &venue);
+        let mut venue = Venue::new(&setup.venue, &venue);
         let conceding = venue.conceding.len();
         let count = setup.instruments.len();
+        let timetable = Timetable::new(setup.settings.calendars.iter().map(Option::as_deref), count);
+        for (k, _) in timetable.each().iter().enumerate().filter(|(_, hours)| hours.is_some()) {
+            venue.floors[k].auctions = Some(Auctions::of(feed.line(k)));
+        }
         Self {
             setup,
             equity: EquityCurve::new(equity_every, feed.rows()),
@@ -113,6 +119,7 @@ impl<'d> Session<'d> {
             agenda: Agenda::default(),
             direct: latencies.feed.is_none(),
             clocks: Clocks::new(latencies, seed),
+            timetable,
             known,
             daily: vec![Daily::default(); count],
             blotter: Blotter { conceding: venue.conceding.clone(), ..Blotter::default() },
@@ -158,6 +165,7 @@ impl<'d> Session<'d> {
             direct: self.direct,
             agenda: self.agenda.clone(),
             clocks: self.clocks.clone(),
+            timetable: self.timetable.clone(),
             known: self.known.clone(),
             daily: self.daily.clone(),
             venue: self.venue.clone(),
@@ -240,7 +248,15 @@ impl<'d> Session<'d> {
         self.held.ambiguous_bars = self.venue.floors.iter().map(|floor| floor.ambiguous_bars()).sum();
         self.held.mean_equity = self.equity.mean();
         let data = self.feed.lines().iter().map(DataSeen::of).collect();
-        Ok(Record { blotter: self.blotter, equity: self.equity.finish(), ledger: self.ledger, held: self.held, data })
+        let outside = self.timetable.outside();
+        Ok(Record {
+            blotter: self.blotter,
+            equity: self.equity.finish(),
+            ledger: self.ledger,
+            held: self.held,
+            data,
+            outside,
+        })
     }
 
     /// Reads on in the data of which `arrival` came last; what is on its way to the strategy stays at hand, and the row before.
@@ -280,13 +296,15 @@ impl<'d> Session<'d> {
     #[inline(always)]
     fn happen(&mut self, arrival: &Arrival) -> Result<(), BacktestError> {
         let Event { time, instrument, kind } = arrival.event;
+        if !self.timetable.is_empty() {
+            self.keep_hours_of(arrival);
+        }
         let line = self.feed.line(instrument);
         let floor = &mut self.venue.floors[instrument];
         match kind {
             EventKind::Bar => {
-                if let Some(bar) = line.bar(arrival.row).filter(|_| floor.by_bars() && !floor.is_idle()) {
-                    floor.at_row(0, arrival.row);
-                    floor.on_bar(bar, ends_day(line.bar(arrival.row + 1).map(|next| next.open_at), bar.open_at));
+                if floor.by_bars() && !floor.is_idle() {
+                    self.meet_bar(instrument, arrival.row);
                     self.expect_open(instrument);
                 }
             }
@@ -314,6 +332,9 @@ impl<'d> Session<'d> {
             }
             EventKind::Timer => {}
         }
+        if !self.timetable.is_empty() {
+            self.venue.floors[instrument].begin(time, kind == EventKind::Trade);
+        }
         if self.venue.floors[instrument].is_quiet() { Ok(()) } else { self.settle(instrument) }
     }
 
@@ -323,23 +344,27 @@ impl<'d> Session<'d> {
         if !floor.by_bars() || floor.is_idle() {
             return;
         }
-        let Some(row) = self.feed.next_bar(instrument).filter(|row| self.expected[instrument] != Some(*row)) else { return };
-        let Some(bar) = self.feed.line(instrument).bar(row) else { return };
-        if floor.awaits_open(bar.open_at) {
+        let Some(row) = self.next_bar(instrument).filter(|row| self.expected[instrument] != Some(*row)) else { return };
+        let Some(bar) = self.feed.line(instrument).bar(row).copied() else { return };
+        let Some(opens_at) = self.opens_at(instrument, &bar) else { return };
+        if self.venue.floors[instrument].awaits_open(opens_at) {
             self.expected[instrument] = Some(row);
-            self.agenda.put(bar.open_at, Phase::Opens, Due::Open(instrument));
+            self.agenda.put(opens_at, Phase::Opens, Due::Open(instrument));
         }
+    }
+
+    /// The row of the next bar of an instrument, which is not over yet.
+    pub(super) fn next_bar(&self, instrument: usize) -> Option<usize> {
+        self.feed.next_bar(instrument)
     }
 
     /// The next bar of an instrument opens.
     pub(super) fn open_bar(&mut self, instrument: usize) {
         let Some(row) = self.expected[instrument] else { return };
-        let line = self.feed.line(instrument);
-        let Some(bar) = line.bar(row) else { return };
-        let before = row.checked_sub(1).and_then(|k| line.bar(k)).map_or(Timestamp::MIN, |before| before.open_at);
+        let Some((bar, first)) = self.opening_bar(instrument, row) else { return };
         let floor = &mut self.venue.floors[instrument];
         floor.at_row(0, row);
-        floor.on_open(bar, ends_day(Some(bar.open_at), before));
+        floor.on_open(&bar, first);
     }
 
     /// Shows the strategy what became known, and sends what it asks for.
@@ -370,6 +395,7 @@ impl<'d> Session<'d> {
             increments: &self.setup.increments,
             ledger: &self.ledger,
             equity,
+            hours: self.timetable.each(),
         };
         (view, &mut self.orders)
     }
@@ -435,10 +461,4 @@ impl<'d> Session<'d> {
         let symbol = &self.setup.instruments[event.instrument].symbol;
         BacktestError::Money { place: format!("{symbol} at {}", event.time), error }
     }
-}
-
-/// Whether `next`, if anything, comes on another day of UTC than `this`.
-fn ends_day(next: Option<Timestamp>, this: Timestamp) -> bool {
-    const DAY: i64 = 86_400 * Timestamp::NANOS;
-    next.is_none_or(|next| next.0.div_euclid(DAY) != this.0.div_euclid(DAY))
 }

@@ -2,10 +2,11 @@
 
 use crate::sim2real::Timestamp;
 
+use super::hours::TradingHours;
 use super::known::Known;
 use super::{
-    Bar, Bracket, Cash, Condition, DepthBook, Increments, Instrument, Ledger, Link, OpenOrder, OrderId, OrderKind, Price,
-    Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Ticket,
+    Bar, Bracket, Calendar, Cash, Condition, DepthBook, Hours, Increments, Instrument, Ledger, Link, OpenOrder, OrderId,
+    OrderKind, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Ticket,
 };
 
 /// What brought an event about; in the order in which they come at one instant.
@@ -60,6 +61,7 @@ pub struct View<'a> {
     pub(super) increments: &'a [Increments],
     pub(super) ledger: &'a Ledger,
     pub(super) equity: Cash,
+    pub(super) hours: &'a [Option<TradingHours<'a>>],
 }
 
 impl<'a> View<'a> {
@@ -141,6 +143,19 @@ impl<'a> View<'a> {
     #[must_use]
     pub fn whole_lots(&self, instrument: usize, quantity: Quantity) -> Quantity {
         self.increments.get(instrument).map_or(Quantity::ZERO, |steps| steps.whole_lots(quantity))
+    }
+
+    /// The session of an instrument now, with its open and close; none while its market is closed, and where it has no
+    /// calendar.
+    #[must_use]
+    pub fn session(&self, instrument: usize) -> Option<Hours> {
+        self.hours.get(instrument)?.as_ref()?.session_at(self.event.time)
+    }
+
+    /// When the market of an instrument is open, where its run says so.
+    #[must_use]
+    pub fn calendar(&self, instrument: usize) -> Option<&'a Calendar> {
+        Some(self.hours.get(instrument)?.as_ref()?.calendar())
     }
 
     /// Our orders of an instrument that work, as far as is known, the oldest first.

@@ -38,14 +38,15 @@ pub enum OrderKind {
         /// Distance of the trigger from the best price since it arrived.
         distance: Price,
     },
-    /// Takes part in the next opening.
+    /// Takes part in the next opening: the first bar of a session, or with quotes and a calendar the first price after it
+    /// opens.
     MarketOnOpen,
     /// Takes part in the next opening, at `price` or better.
     LimitOnOpen {
         /// The worst price it trades at.
         price: Price,
     },
-    /// Takes part in the close of the session.
+    /// Takes part in the close of the session: the last bar of it, or with quotes and a calendar the last price known then.
     MarketOnClose,
     /// Takes part in the close of the session, at `price` or better.
     LimitOnClose {
@@ -69,6 +70,12 @@ impl OrderKind {
             Self::MarketOnClose => "market_on_close",
             Self::LimitOnClose { .. } => "limit_on_close",
         }
+    }
+
+    /// Whether it takes part in an opening or a close, and in nothing else.
+    #[must_use]
+    pub fn is_for_auction(self) -> bool {
+        matches!(self, Self::MarketOnOpen | Self::LimitOnOpen { .. } | Self::MarketOnClose | Self::LimitOnClose { .. })
     }
 
     /// The worst price it may trade at, where it has one.
@@ -121,7 +128,8 @@ pub enum TimeInForce {
     /// Until it is filled or cancelled.
     #[default]
     GoodTillCancelled,
-    /// To the end of the session; without a calendar, of the day of UTC.
+    /// To the close of the day of trading, the next where the market is closed; without a calendar to the end of the day of
+    /// UTC.
     Day,
     /// To an instant, from which on it works no longer.
     GoodTillDate(Timestamp),

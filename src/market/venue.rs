@@ -9,6 +9,7 @@
 //!
 //! A replayed history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only.
 
+mod auction;
 mod bars;
 mod by_order;
 mod displayed;
@@ -28,6 +29,7 @@ use super::{AnotherFill, Book, DepthBook, Execution, Increments, Quantity, Side}
 pub use path::Intrabar;
 pub use queue::QueueModel;
 
+pub(super) use auction::Auctions;
 pub(super) use by_order::Others;
 pub(super) use floor::{Floor, Rules};
 pub(super) use resting::{Filled, Outcome, Resting, What};
@@ -163,10 +165,13 @@ impl Floor {
     pub fn arrive(&mut self, orders: Vec<Resting>, at: Timestamp) {
         let first = self.resting.len();
         self.resting.extend(orders);
-        if !self.by_bars {
+        let open = self.is_open();
+        if !open || !self.by_bars {
             for k in first..self.resting.len() {
-                if self.resting[k].left > Quantity::ZERO {
-                    self.meet_shown(k, at);
+                match self.resting[k].left > Quantity::ZERO {
+                    true if open => self.meet_shown(k, at),
+                    true => self.wait_for_open(k, at),
+                    false => {}
                 }
             }
         }

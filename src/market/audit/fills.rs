@@ -60,7 +60,7 @@ pub(super) fn impossible(backtest: &Backtest, record: &Record) -> Vec<FillFault>
         let history =
             backtest.histories().get(fill.instrument).filter(|h| h.shows_bars_alone() || !h.quotes().is_empty())?;
         let decided_at = decided_at(record, fill)?;
-        let range = range(history, decided_at, fill.filled_at);
+        let range = with_trade(range(history, decided_at, fill.filled_at), history, record, fill);
         let fault = match range {
             _ if fill.filled_at < decided_at => Impossible::BeforeDecision,
             None => Impossible::NoMarket,
@@ -78,6 +78,11 @@ pub(super) fn at_seen_prices(backtest: &Backtest, cut_off: &Record, now: Timesta
     let one = |fill: &Fill| {
         let history = backtest.histories().get(fill.instrument)?;
         let decided_at = decided_at(cut_off, fill).filter(|at| *at == now && history.shows_bars_alone())?;
+        // Where hours are known, a bar that is under way may have its open or its close in them still to come.
+        let hours = backtest.settings().calendars.get(fill.instrument).is_some_and(Option::is_some);
+        if hours && fill.filled_at > now {
+            return None;
+        }
         Some(fault_of(fill, decided_at, Impossible::SeenPrice, None, backtest.instruments()))
     };
     cut_off.blotter.fills.iter().filter_map(one).collect()
@@ -123,6 +128,17 @@ fn range(history: &History, decided_at: Timestamp, time: Timestamp) -> Option<(f
     };
     let (low, high) = prices.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
     (low <= high).then_some((low, high))
+}
+
+/// The same with the last trade, which is what an order for the open or the close meets where trades are known.
+fn with_trade(range: Option<(f64, f64)>, history: &History, record: &Record, fill: &Fill) -> Option<(f64, f64)> {
+    let for_auction = record.blotter.order(fill.order_id).is_some_and(|order| order.kind.is_for_auction());
+    let before = history.prints().partition_point(|print| print.time <= fill.filled_at);
+    let Some(print) = before.checked_sub(1).and_then(|k| history.prints().get(k)).filter(|_| for_auction) else {
+        return range;
+    };
+    let (low, high) = range.unwrap_or((print.price, print.price));
+    Some((low.min(print.price), high.max(print.price)))
 }
 
 /// Best prices of the quotes that were in force at `time`: those that carry it, and the last before.

@@ -57,6 +57,18 @@ impl<'c> Trading<'c> {
         self.previous_close
     }
 
+    /// The session at `time`, without moving there: for whoever may only look.
+    #[must_use]
+    pub fn seen_at(&self, time: Timestamp) -> Option<Hours> {
+        if time < self.from || time >= self.until { self.calendar.session_at(time) } else { self.session }
+    }
+
+    /// The calendar.
+    #[must_use]
+    pub fn calendar(&self) -> &'c Calendar {
+        self.calendar
+    }
+
     #[inline]
     fn move_to(&mut self, time: Timestamp) {
         if time < self.from || time >= self.until {

@@ -87,7 +87,8 @@ pub struct Counts {
     pub cancelled: usize,
     /// Orders that were under way when the data ended.
     pub unfilled: usize,
-    /// Orders the venue refused: post-only ones that would have taken, those to be filled whole that could not be.
+    /// Orders the venue refused: post-only ones that would have taken, those to be filled whole that could not be,
+    /// those that could not wait and came while the market was closed.
     pub refused_by_venue: usize,
     /// Orders whose time was over before they were filled whole.
     pub expired: usize,
@@ -208,6 +209,9 @@ pub struct InstrumentSummary {
     pub fees: f64,
     /// Number of fills.
     pub fills: usize,
+    /// Rows from outside the sessions of its calendar, which no order met; none where it has no calendar.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rows_outside_sessions: Option<usize>,
 }
 
 impl InstrumentSummary {
@@ -223,6 +227,7 @@ impl InstrumentSummary {
                 unrealised: position.value().to_f64() - position.basis.to_f64(),
                 fees: position.fees.to_f64(),
                 fills: record.blotter.fills.iter().filter(|fill| fill.instrument == k).count(),
+                rows_outside_sessions: record.outside.get(k).copied().flatten(),
             })
             .collect()
     }

@@ -84,17 +84,21 @@ impl Floor {
     ///
     /// Only orders that had arrived when it opened take part: of a bar nobody knows what came after an instant within it. What
     /// is filled carries the time at which the bar could be known, the latest it can have been.
-    pub fn on_bar(&mut self, bar: &Bar, last_of_session: bool) {
+    ///
+    /// The last bar of a session `closes_for` the orders that arrived by that instant.
+    pub fn on_bar(&mut self, bar: &Bar, closes_for: Option<Timestamp>) {
         let at = bar.known_at;
-        if !self.resting.iter().any(|order| order.from <= bar.open_at) {
+        if !self.resting.iter().any(|order| order.from <= closes_for.unwrap_or(bar.open_at)) {
             return;
         }
-        let way = self.way(bar);
-        for leg in way.windows(2) {
-            self.walk(bar, leg[0], leg[1], at);
+        if self.awaits_open(bar.open_at) {
+            let way = self.way(bar);
+            for leg in way.windows(2) {
+                self.walk(bar, leg[0], leg[1], at);
+            }
         }
-        if last_of_session {
-            self.close(bar, at);
+        if let Some(by) = closes_for {
+            self.close(bar, by, at);
         }
         self.sweep(at);
     }
@@ -202,12 +206,12 @@ impl Floor {
     }
 
     /// Orders for the close meet the last price of the session.
-    fn close(&mut self, bar: &Bar, at: Timestamp) {
+    fn close(&mut self, bar: &Bar, by: Timestamp, at: Timestamp) {
         let offer = self.offer(bar, at, bar.close);
         for k in 0..self.resting.len() {
             let order = self.resting[k];
             let on_close = matches!(order.kind, OrderKind::MarketOnClose | OrderKind::LimitOnClose { .. });
-            if !on_close || order.from > bar.open_at {
+            if !on_close || order.from > by {
                 continue;
             }
             if order.accepts(bar.close) {

@@ -156,7 +156,7 @@ impl Floor {
                 self.taken.refresh(side, best);
             }
         }
-        if self.resting.is_empty() {
+        if self.resting.is_empty() || !self.is_open() {
             return;
         }
         for k in 0..self.resting.len() {
@@ -186,7 +186,7 @@ impl Floor {
                 self.make(k, &offer, order.tradable());
             }
             _ if order.waits() => {
-                let Some(price) = self.stop_price(order.side) else { return };
+                let Some(price) = self.touch_price(order.side) else { return };
                 self.resting[k].follow(price);
                 if self.resting[k].set_off_by(price) {
                     self.meet_shown(k, at);
@@ -204,7 +204,8 @@ impl Floor {
             self.shown = Shown::Last(price);
             self.taken = Taken::default();
         }
-        if self.resting.is_empty() {
+        self.heed_print(price, print.size, at);
+        if self.resting.is_empty() || !self.is_open() {
             return;
         }
         for k in 0..self.resting.len() {
@@ -250,13 +251,13 @@ impl Floor {
         self.sweep(at);
     }
 
-    /// The price that sets a stop of `side` off: of what it would take from.
-    fn stop_price(&self, side: Side) -> Option<Price> {
+    /// The best price an order of `side` can take, which sets a stop of that side off.
+    pub(super) fn touch_price(&self, side: Side) -> Option<Price> {
         self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok())
     }
 
     /// What an order of `side` can take now.
-    fn offer_shown(&self, side: Side, at: Timestamp) -> Option<Offer> {
+    pub(super) fn offer_shown(&self, side: Side, at: Timestamp) -> Option<Offer> {
         let reference = self.shown.reference(self.rules.reference, side)?;
         let mid = self.shown.mid().unwrap_or(reference);
         let book = self.shown.book(at);
@@ -286,7 +287,7 @@ impl Floor {
         [of(Side::Sell).min(mid), of(Side::Buy).max(mid)]
     }
 
-    fn row(&self) -> usize {
+    pub(super) fn row(&self) -> usize {
         match self.shown {
             Shown::Depth(_) => self.rows[3],
             Shown::Last(_) => self.rows[2],

@@ -6,6 +6,7 @@ use crate::market::{
 };
 use crate::sim2real::{Run, Tick, Timestamp};
 
+use super::auction::Auctions;
 use super::by_order::Others;
 use super::queue::Place;
 use super::resting::{Filled, Outcome, Resting, What};
@@ -62,6 +63,8 @@ pub(in crate::market) struct Floor {
     /// The data know the orders of others one by one.
     pub(super) by_order: bool,
     pub(super) others: Others,
+    /// Its hours, where they are known; else it never closes.
+    pub auctions: Option<Auctions>,
     pub(super) messages: usize,
     pub(super) outcomes: Vec<Outcome>,
     /// What each mechanism that acts on prices added to the price of the last fill [currency].
@@ -96,6 +99,7 @@ impl Floor {
             by_bars: false,
             by_order: false,
             others: Others::default(),
+            auctions: None,
             messages: 0,
             outcomes: Vec::new(),
             concessions: vec![0.0; conceding],
@@ -326,7 +330,7 @@ impl Floor {
         self.tell(id, at, What::Replaced { quantity: whole, kind });
         if left <= Quantity::ZERO {
             self.end(k, at, Reason::Asked);
-        } else if (grows || price.is_some()) && !self.by_bars {
+        } else if (grows || price.is_some()) && !self.by_bars && self.is_open() {
             // What may now take does, and what must not is over.
             self.resting[k].place = Place::default();
             self.meet_shown(k, at);
