@@ -136,6 +136,7 @@ fn metric_names() -> Vec<String> {
         equity: Vec::new(),
         ledger: Ledger::new(Cash::default(), 1),
         held: crate::market::Held::default(),
+        account: crate::market::AccountRecord::default(),
     };
     let value = Metrics::of(&empty).ok().and_then(|metrics| serde_json::to_value(&metrics).ok()).unwrap_or_default();
     let known: BTreeMap<String, f64> = Metrics::of(&empty).map(|metrics| figures(&metrics)).unwrap_or_default();

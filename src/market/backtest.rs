@@ -1,10 +1,12 @@
 //! The backtest: what it is set up of, and what it leaves. Its loop is a [`Session`].
 
+use std::sync::Arc;
+
 use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
 use super::{
-    Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError, Matching, MoneyError,
+    Account, AccountRecord, Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError, Matching, MoneyError,
     QueueModel, Reference, Session, Strategy,
 };
 
@@ -34,6 +36,8 @@ pub struct Settings {
     pub matching: Matching,
     /// How long messages take.
     pub latencies: Latencies,
+    /// How the account is kept; none for cash and prices in one currency, and nothing that happens to what is held.
+    pub account: Option<Arc<Account>>,
 }
 
 impl Settings {
@@ -41,7 +45,7 @@ impl Settings {
     #[must_use]
     pub fn with_cash(cash: Cash) -> Self {
         let (matching, latencies) = Default::default();
-        Self { cash, seed: Seed::default(), max_leverage: 1.0, reference: None, matching, latencies }
+        Self { cash, seed: Seed::default(), max_leverage: 1.0, reference: None, matching, latencies, account: None }
     }
 }
 
@@ -83,6 +87,32 @@ pub enum BacktestError {
         place: String,
         /// What is wrong.
         error: LedgerError,
+    },
+    /// There is something in a currency of which nothing says yet what it is worth.
+    #[error(
+        "{place}: there is something in {currency}, and no rate of it is known yet\nhint: give [[rate]] a row that is no later than the first trade in {currency}, or a constant `value`"
+    )]
+    NoRate {
+        /// Where it came up.
+        place: String,
+        /// The currency.
+        currency: String,
+    },
+    /// An account that does not say on which terms each instrument is held.
+    #[error("there are terms for {terms} of {instruments} instruments\nhint: give terms for each instrument, in their order")]
+    Terms {
+        /// Number of terms.
+        terms: usize,
+        /// Number of instruments.
+        instruments: usize,
+    },
+    /// An account that does not say what each currency is worth.
+    #[error("there are {rates} rates for {currencies} foreign currencies\nhint: give a rate for each but the first")]
+    Rates {
+        /// Number of rates.
+        rates: usize,
+        /// Number of currencies but the first.
+        currencies: usize,
     },
     /// Mechanisms that give a price no market has.
     #[error(
@@ -133,13 +163,15 @@ pub struct Record {
     pub ledger: Ledger,
     /// How much was held.
     pub held: Held,
+    /// Corporate actions and margin calls.
+    pub account: AccountRecord,
 }
 
 impl Backtest {
     /// A backtest of `instruments` on `histories` (one an instrument, in the same order), with orders filled by `venue`.
     ///
     /// # Errors
-    /// If there are no data, the two differ in number, or a tick size, lot size or the leverage cannot be.
+    /// If there are no data, the two differ in number, or a tick size, lot size, the leverage or the account cannot be.
     pub fn new(
         instruments: Vec<Instrument>,
         histories: Vec<History>,
@@ -164,6 +196,9 @@ impl Backtest {
             .iter()
             .map(|i| Increments::of(i).map_err(|error| BacktestError::Money { place: i.symbol.clone(), error }))
             .collect::<Result<_, _>>()?;
+        if let Some(account) = &settings.account {
+            account.check(&instruments)?;
+        }
         Ok(Self { instruments, increments, histories, venue, settings })
     }
 

@@ -69,6 +69,7 @@ fn set_up(run: &RunFile, histories: Vec<History>) -> Result<Backtest, InputError
         reference: reference(run, &histories)?,
         matching: run.matching::<Matching>()?,
         latencies: run.latency::<Latencies>()?,
+        account: None,
     };
     Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))
 }
