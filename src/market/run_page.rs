@@ -63,13 +63,22 @@ fn exposures(backtest: &Backtest, record: &Record) -> Vec<Exposure> {
 }
 
 fn held(record: &Record, instrument: usize) -> Vec<f64> {
-    let mut fills = record.blotter.fills.iter().filter(|fill| fill.instrument == instrument).peekable();
+    let fills = record.blotter.fills.iter().enumerate();
+    let mut fills = fills.filter(|(_, fill)| fill.instrument == instrument).peekable();
+    let mut actions = record.account.actions.iter().filter(|booked| booked.action.instrument == instrument).peekable();
     let mut position = 0.0;
     let at = |point: &EquityPoint| {
-        while let Some(fill) = fills.next_if(|fill| fill.filled_at <= point.time) {
-            position += fill.quantity.signed(fill.side).to_f64();
+        loop {
+            let booked = actions.peek().filter(|booked| booked.action.at <= point.time).map_or(usize::MAX, |b| b.fills);
+            if let Some((_, fill)) = fills.next_if(|(k, fill)| *k < booked && fill.filled_at <= point.time) {
+                position += fill.quantity.signed(fill.side).to_f64();
+            } else if let Some(booked) = actions.next_if(|_| booked < usize::MAX) {
+                // After a split in new units.
+                position = booked.after.to_f64();
+            } else {
+                break position;
+            }
         }
-        position
     };
     record.equity.iter().map(at).collect()
 }
