@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use super::document::Document;
 use super::error::InputError;
+use super::margin_entry::MarginEntry;
 
 /// An instrument of a document.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -22,6 +23,12 @@ pub struct InstrumentEntry {
     pub average_daily_volume: Option<f64>,
     /// Standard deviation of the daily return (a fraction).
     pub daily_volatility: Option<f64>,
+    /// Currency of its prices, fees and dividends; none for that of the run.
+    pub currency: Option<String>,
+    /// Units of the underlying in one unit traded, above 0; none for 1.
+    pub multiplier: Option<i64>,
+    /// What equity a position requires; none for nothing beyond the run's `max_leverage`.
+    pub margin: Option<MarginEntry>,
 }
 
 fn one() -> f64 {
@@ -50,6 +57,38 @@ pub(super) fn check_instruments(document: &Document, instruments: &[InstrumentEn
         if !seen.insert(instrument.symbol.as_str()) {
             let message = format!("the instrument `{}` is here twice", instrument.symbol);
             return Err(document.error(&["instrument", &number, "symbol"], message).hint("drop one of the two"));
+        }
+    }
+    Ok(())
+}
+
+/// Holds the terms on which instruments of a run are held to what they can be.
+pub(super) fn check_terms(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
+    for (index, instrument) in instruments.iter().enumerate() {
+        let number = index.to_string();
+        if let Some(multiplier) = instrument.multiplier.filter(|multiplier| !(1..=1_000_000_000).contains(multiplier)) {
+            let error = document.error(&["instrument", &number, "multiplier"], "expected a whole number from 1 to 1e9");
+            return Err(error.found(multiplier).hint("it is 50 of a future on 50 times an index; 1 of a share"));
+        }
+        if instrument.currency.as_ref().is_some_and(String::is_empty) {
+            let error = document.error(&["instrument", &number, "currency"], "expected the name of a currency");
+            return Err(error.found_text("").hint("leave it out where it is that of the run"));
+        }
+        if let Some(margin) = &instrument.margin {
+            margin.check(document, &number)?;
+        }
+    }
+    Ok(())
+}
+
+/// Holds the instruments of a twin to say nothing of the account, which it has none of.
+pub(super) fn check_no_terms(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
+    for (index, instrument) in instruments.iter().enumerate() {
+        let InstrumentEntry { currency, multiplier, margin, .. } = instrument;
+        let there = [("currency", currency.is_some()), ("multiplier", multiplier.is_some()), ("margin", margin.is_some())];
+        if let Some((key, _)) = there.into_iter().find(|(_, there)| *there) {
+            let error = document.error(&["instrument", &index.to_string(), key], format!("only a run has the key `{key}`"));
+            return Err(error.hint("a twin knows prices and costs, and no account: drop the key"));
         }
     }
     Ok(())

@@ -1,6 +1,8 @@
 //! Markets: what is traded, the backtest that trades it, and `execution`, the plant every order meets.
 
 mod account;
+#[cfg(feature = "io")]
+mod account_file;
 mod agenda;
 mod audit;
 mod backtest;

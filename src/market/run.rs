@@ -2,9 +2,10 @@
 
 use chrono_tz::Tz;
 
-use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash, listed_mechanism};
+use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RateSource, RunFile, file_hash, listed_mechanism};
 use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 
+use super::account_file::{AccountFiles, account};
 use super::run_log::InputFile;
 use super::{
     Backtest, BacktestError, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError, Provenance,
@@ -31,16 +32,25 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     // What needs no data is said before they are read.
     venue(run)?;
     let mut inputs = vec![own_document(run)?];
+    let mut files = AccountFiles::read_rates(run)?;
     let mut read = Vec::new();
     for entry in &run.data {
-        let history = history(entry)?;
-        let rows = history.rows();
+        let history = if entry.kind == FeedKind::Actions { None } else { Some(history(entry)?) };
+        let rows = match &history {
+            Some(history) => history.rows(),
+            None => files.read_actions(run, entry)?,
+        };
         inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: Some(rows) });
-        read.push(Some(history));
+        read.push(history);
+    }
+    for (number, rate) in run.rates.iter().enumerate() {
+        if let RateSource::File { path, named, .. } = &rate.source {
+            inputs.push(InputFile { path: named.clone(), sha256: file_hash(path)?, rows: files.rows_of_rate(number) });
+        }
     }
     let joined = run.instruments.iter().enumerate().map(|(index, entry)| joined(run, index, &entry.symbol, &mut read));
     let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
-    let backtest = set_up(run, histories)?;
+    let backtest = set_up(run, histories, files)?;
     let venue = backtest.venue();
     let provenance = Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -56,7 +66,7 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
 }
 
 /// The backtest of `run` on data that were read.
-fn set_up(run: &RunFile, histories: Vec<History>) -> Result<Backtest, InputError> {
+fn set_up(run: &RunFile, histories: Vec<History>, files: AccountFiles) -> Result<Backtest, InputError> {
     let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     let venue = venue(run)?;
     run_needs::check(run, &venue, &instruments, &histories)?;
@@ -69,7 +79,7 @@ fn set_up(run: &RunFile, histories: Vec<History>) -> Result<Backtest, InputError
         reference: reference(run, &histories)?,
         matching: run.matching::<Matching>()?,
         latencies: run.latency::<Latencies>()?,
-        account: None,
+        account: account(run, files)?,
     };
     Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))
 }
@@ -80,7 +90,8 @@ impl PreparedRun {
     /// # Errors
     /// As [`prepare_run`], but for what it says of files.
     pub fn variant(&self, run: &RunFile) -> Result<Backtest, InputError> {
-        set_up(run, self.backtest.histories().to_vec())
+        let files = AccountFiles::of(self.backtest.settings().account.as_ref());
+        set_up(run, self.backtest.histories().to_vec(), files)
     }
 
     /// All that `record`, the record of this backtest, is shown as.
@@ -94,7 +105,8 @@ impl PreparedRun {
 
 /// The zone of the data's times, where they have one in common.
 fn zone(run: &RunFile) -> Tz {
-    let mut zones = run.data.iter().map(|entry| entry.format.time.zone);
+    let market = run.data.iter().filter(|entry| entry.kind != FeedKind::Actions);
+    let mut zones = market.map(|entry| entry.format.time.zone);
     let first = zones.next().unwrap_or(Tz::UTC);
     if zones.all(|zone| zone == first) { first } else { Tz::UTC }
 }
@@ -118,6 +130,8 @@ fn venue(run: &RunFile) -> Result<Assembly<Execution>, InputError> {
 /// The history in a data file.
 fn history(entry: &DataEntry) -> Result<History, InputError> {
     match entry.kind {
+        // They are no data of a market.
+        FeedKind::Actions => Ok(History::default()),
         FeedKind::Bars => History::read_bars(&entry.path, &entry.format, entry.interval),
         FeedKind::Quotes => History::read_quotes(&entry.path, &entry.format),
         FeedKind::Trades => History::read_trades(&entry.path, &entry.format),
@@ -183,6 +197,7 @@ pub fn explained(run: &RunFile, error: &BacktestError) -> InputError {
         BacktestError::Leverage(_) => &["run", "max_leverage"],
         BacktestError::ModelPrice { .. } => &["mechanism"],
         BacktestError::Latency(_) => &["latency"],
+        BacktestError::NoRate { .. } => &["rate"],
         BacktestError::Queue(_) => &["matching", "queue"],
         _ => &["run"],
     };
