@@ -103,6 +103,20 @@ pub struct AccountRecord {
 }
 
 impl Account {
+    /// The account as far as anybody can know it at `now`: without later actions and rates.
+    pub(super) fn until(&self, now: Timestamp) -> Self {
+        let known = |rate: &Rate| match rate {
+            Rate::Known(rates) => Rate::Known(rates.iter().copied().filter(|(at, _)| *at <= now).collect()),
+            rate => rate.clone(),
+        };
+        Self {
+            currencies: self.currencies.clone(),
+            terms: self.terms.clone(),
+            rates: self.rates.iter().map(known).collect(),
+            actions: self.actions.iter().copied().filter(|action| action.at <= now).collect(),
+        }
+    }
+
     /// Holds it to what it can be for `instruments`.
     pub(super) fn check(&self, instruments: &[Instrument]) -> Result<(), BacktestError> {
         let refuse = |place: String, error| Err(BacktestError::Account { place, error });
