@@ -147,7 +147,8 @@ fn a_foreign_share_is_a_debt_in_its_currency_and_worth_its_rate() {
     let metrics = Metrics::of(&always).unwrap();
     assert_eq!((nanos(metrics.unrealised), nanos(metrics.final_equity)), (30.0, 100_028.5));
     let of = CurrencySummary::of(&always, "USD").unwrap();
-    assert_eq!((of[1].currency.as_str(), of[1].cash, of[1].holdings, of[1].rate), ("EUR", -201.0, 220.0, Some(1.5)));
+    let (owed, held) = (nanos(of[1].cash), nanos(of[1].holdings));
+    assert_eq!((of[1].currency.as_str(), owed, held, of[1].rate), ("EUR", -201.0, 220.0, Some(1.5)));
     // From its instant on, and not a nanosecond before.
     let known = |from: i64| Rate::Known(vec![(Timestamp(0), at(1.5)), (Timestamp(from), at(2.0))]);
     let gains = |rate| equity(&run(history(), &[], in_euros(rate), plan()))[1..].to_vec();

@@ -25,8 +25,8 @@ pub struct InstrumentEntry {
     pub daily_volatility: Option<f64>,
     /// Currency of its prices, fees and dividends; none for that of the run.
     pub currency: Option<String>,
-    /// Units of the underlying in one unit traded, above 0; none for 1.
-    pub multiplier: Option<i64>,
+    /// Units of the underlying in one unit traded, a whole number above 0; none for 1.
+    pub multiplier: Option<f64>,
     /// What equity a position requires; none for nothing beyond the run's `max_leverage`.
     pub margin: Option<MarginEntry>,
 }
@@ -66,7 +66,8 @@ pub(super) fn check_instruments(document: &Document, instruments: &[InstrumentEn
 pub(super) fn check_terms(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
     for (index, instrument) in instruments.iter().enumerate() {
         let number = index.to_string();
-        if let Some(multiplier) = instrument.multiplier.filter(|multiplier| !(1..=1_000_000_000).contains(multiplier)) {
+        let whole = |multiplier: f64| multiplier.fract() == 0.0 && (1.0..=1e9).contains(&multiplier);
+        if let Some(multiplier) = instrument.multiplier.filter(|multiplier| !whole(*multiplier)) {
             let error = document.error(&["instrument", &number, "multiplier"], "expected a whole number from 1 to 1e9");
             return Err(error.found(multiplier).hint("it is 50 of a future on 50 times an index; 1 of a share"));
         }

@@ -7,7 +7,7 @@ use crate::sim2real::Timestamp;
 
 use super::agenda::{Agenda, Due, Phase};
 use super::{
-    BacktestError, Cash, Fraction, Increments, Instrument, Ledger, LedgerError, MoneyError, Price, Quantity, Settings, Terms,
+    BacktestError, Cash, Fraction, History, Increments, Instrument, Ledger, LedgerError, MoneyError, Price, Quantity, Settings, Terms,
 };
 
 /// How the account of a run is kept.
@@ -139,6 +139,12 @@ impl Account {
         for (k, rate) in self.rates.iter().enumerate() {
             rate.check(k + 1, &self.currencies[k + 1], &self.terms)?;
         }
+        Ok(())
+    }
+
+    /// Holds corporate actions to what they can be beside the bars of their instruments.
+    pub(super) fn check_actions(&self, instruments: &[Instrument], histories: &[History]) -> Result<(), BacktestError> {
+        let refuse = |place: String, error| Err(BacktestError::Account { place, error });
         for action in &self.actions {
             let place = |symbol: &str| format!("{symbol} at {}", action.at);
             let Some(instrument) = instruments.get(action.instrument) else {
@@ -153,6 +159,12 @@ impl Account {
                     return refuse(place(&instrument.symbol), LedgerError::Split { new, old, lot: instrument.lot_size });
                 }
                 ActionKind::Dividend { .. } | ActionKind::Split { .. } => {}
+            }
+            let bars = histories.get(action.instrument).map_or(&[][..], History::bars);
+            let next = bars.partition_point(|bar| bar.known_at <= action.at);
+            if let Some(bar) = bars.get(next).filter(|bar| bar.open_at < action.at) {
+                let (symbol, at) = (instrument.symbol.clone(), action.at);
+                return Err(BacktestError::WithinBar { symbol, at, open_at: bar.open_at, known_at: bar.known_at });
             }
         }
         Ok(())

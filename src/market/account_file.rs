@@ -82,7 +82,7 @@ fn terms(instrument: &InstrumentEntry, currencies: &[String]) -> Terms {
     let named = |name: &String| currencies.iter().position(|currency| currency == name);
     let terms = Terms {
         currency: instrument.currency.as_ref().and_then(named).unwrap_or_default(),
-        multiplier: instrument.multiplier.and_then(Multiplier::new).unwrap_or_default(),
+        multiplier: instrument.multiplier.and_then(|units| Multiplier::new(units as i64)).unwrap_or_default(),
         ..Terms::default()
     };
     // Fractions were held to what they can be.

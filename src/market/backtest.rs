@@ -98,6 +98,20 @@ pub enum BacktestError {
         /// The currency.
         currency: String,
     },
+    /// A dividend or split within a bar, whose prices are then of before and after.
+    #[error(
+        "an action of {symbol} at {at} lies within the bar from {open_at} to {known_at}\nhint: the ex-instant is the open of the first bar without the dividend or after the split: check `ts` and `zone`"
+    )]
+    WithinBar {
+        /// Symbol of the instrument.
+        symbol: String,
+        /// The ex-instant.
+        at: Timestamp,
+        /// When the bar opens.
+        open_at: Timestamp,
+        /// When it is over.
+        known_at: Timestamp,
+    },
     /// An account that does not say on which terms each instrument is held.
     #[error("there are terms for {terms} of {instruments} instruments\nhint: give terms for each instrument, in their order")]
     Terms {
@@ -198,6 +212,7 @@ impl Backtest {
             .collect::<Result<_, _>>()?;
         if let Some(account) = &settings.account {
             account.check(&instruments)?;
+            account.check_actions(&instruments, &histories)?;
         }
         Ok(Self { instruments, increments, histories, venue, settings })
     }

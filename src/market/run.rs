@@ -193,6 +193,11 @@ fn reference(run: &RunFile, histories: &[History]) -> Result<Option<Reference>, 
 /// runs.
 #[must_use]
 pub fn explained(run: &RunFile, error: &BacktestError) -> InputError {
+    if let BacktestError::WithinBar { symbol, .. } = error {
+        let of = |entry: &DataEntry| entry.kind == FeedKind::Actions && entry.symbol == *symbol;
+        let number = run.data.iter().position(of).unwrap_or_default().to_string();
+        return split(run, &["data", &number, "actions"], &error.to_string());
+    }
     let keys: &[&str] = match error {
         BacktestError::Leverage(_) => &["run", "max_leverage"],
         BacktestError::ModelPrice { .. } => &["mechanism"],

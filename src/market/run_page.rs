@@ -2,13 +2,13 @@
 
 use chrono::DateTime;
 
-use crate::report::quantity::{UNDEFINED, fine, number, with_unit};
+use crate::report::quantity::{UNDEFINED, fine, number, percent, with_unit};
 use crate::report::{BacktestPage, Cost, Exposure, Fall, Fill, InForce, Input, MonthReturn, Trade};
 use crate::sim2real::{Parameter, Simulator, Timestamp};
 
 use super::metric::{Drawdown, Metrics, Month, RoundTrip};
 use super::run_figures::{figure_groups, key_figures};
-use super::{Backtest, EquityPoint, Record, Reference, RunSummary};
+use super::{Backtest, EquityPoint, Rate, Record, Reference, Requirement, RunSummary};
 
 /// Fills a page is given: it lists no more.
 const FILLS: usize = 200;
@@ -180,6 +180,48 @@ fn matched(summary: &RunSummary, backtest: &Backtest) -> Vec<(&'static str, Stri
     all
 }
 
+/// How the account was kept, where that was not cash in one currency.
+fn account_terms(backtest: &Backtest, summary: &RunSummary) -> Vec<(String, String)> {
+    let Some(account) = &backtest.settings().account else { return Vec::new() };
+    let mut all = Vec::new();
+    for (instrument, terms) in backtest.instruments().iter().zip(&account.terms) {
+        let mut told = Vec::new();
+        if terms.multiplier.get() != 1 {
+            told.push(format!("{} units in one", terms.multiplier.get()));
+        }
+        if terms.currency != 0 {
+            told.push(format!("in {}", account.currencies.get(terms.currency).map_or("", String::as_str)));
+        }
+        let margin = |what: &str, of: Requirement| {
+            format!("margin {what} {} to open, {} to keep", percent(of.initial.to_f64()), percent(of.maintenance.to_f64()))
+        };
+        for (what, of) in [("long", terms.long), ("short", terms.short)] {
+            if of != Requirement::default() {
+                told.push(margin(what, of));
+            }
+        }
+        if !told.is_empty() {
+            all.push((format!("terms of {}", instrument.symbol), told.join("; ")));
+        }
+    }
+    for (name, rate) in account.currencies.iter().skip(1).zip(&account.rates) {
+        let told = match rate {
+            Rate::Constant(rate) => format!("{} at all times; a trade in it is owed or held in it", rate.to_f64()),
+            Rate::Known(rates) => format!("{} known from their times on; a trade in it is owed or held in it", rates.len()),
+            Rate::PriceOf(k) => format!("the latest price of {}", symbol(backtest, *k)),
+        };
+        all.push((format!("rate of {name}"), told));
+    }
+    match summary.counts.corporate_actions {
+        0 => {}
+        count => all.push((
+            "dividends and splits".to_owned(),
+            format!("{count}; bars and quotes of before a split stay as they were printed"),
+        )),
+    }
+    all
+}
+
 fn in_force(summary: &RunSummary, backtest: &Backtest) -> Vec<InForce> {
     let venue = backtest.venue();
     let currency = &summary.provenance.currency;
@@ -209,6 +251,7 @@ fn in_force(summary: &RunSummary, backtest: &Backtest) -> Vec<InForce> {
     all.push(assumption("market orders", fills));
     all.extend(matched(summary, backtest).into_iter().map(|(name, setting)| assumption(name, setting)));
     all.push(assumption("largest leverage", format!("{} times the equity", number(backtest.settings().max_leverage))));
+    all.extend(account_terms(backtest, summary).into_iter().map(|(name, setting)| assumption(&name, setting)));
     all.push(assumption("market", "the past does not react to what the backtest trades".to_owned()));
     match summary.metrics.returns.gaps {
         0 => {}

@@ -1,9 +1,9 @@
 //! Other futures: the same past, and something else after it.
 
+use std::sync::Arc;
+
 use rand::RngExt;
 use serde::Serialize;
-
-use std::sync::Arc;
 
 use crate::market::{Backtest, BacktestError, Bar, History, Level, Price, Quotes};
 use crate::sim2real::{Seed, Timestamp};
