@@ -144,7 +144,7 @@ fn a_model_price_off_the_tick_is_moved_against_the_order_and_counted_as_rounding
 fn the_parts_of_the_cost_are_what_was_lost_against_the_prices_of_the_decisions() {
     let parts = [("half_spread", "bps", 7.0), ("commission", "bps", 2.0)];
     let record = run(bars(&WALK), &parts, &[(0, 0, Side::Buy, 100.0), (1, 0, Side::Sell, 100.0)]);
-    let costs = Costs::of(&record.blotter);
+    let costs = Costs::of(&record);
     // On paper: bought at 11 and sold at 13.
     let paper = 100.0 * (13.0 - 11.0);
     let actual = record.ledger.equity().unwrap().to_f64() - 100_000.0;

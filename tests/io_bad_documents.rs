@@ -219,7 +219,7 @@ fn a_run_is_held_to_its_contract() {
       hint: a whole number and a unit: "1s", "5m", "1h", "1d"
     "#);
     insta::assert_snapshot!(run("stamp = \"open\"", "trades = \"bars.csv\""), @"
-    run.toml:10:1: expected exactly one of `bars`, `quotes`, `trades` and `book`
+    run.toml:10:1: expected exactly one of `bars`, `quotes`, `trades`, `book` and `actions`
       hint: a second file of the same instrument has a [[data]] section of its own
     ");
     insta::assert_snapshot!(run("bars = \"bars.csv\"", "bars = \"bas.csv\""), @"

@@ -138,6 +138,7 @@ fn metric_names() -> Vec<String> {
         held: crate::market::Held::default(),
         data: Vec::new(),
         outside: Vec::new(),
+        account: crate::market::AccountRecord::default(),
     };
     let value = Metrics::of(&empty).ok().and_then(|metrics| serde_json::to_value(&metrics).ok()).unwrap_or_default();
     let known: BTreeMap<String, f64> = Metrics::of(&empty).map(|metrics| figures(&metrics)).unwrap_or_default();

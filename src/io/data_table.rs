@@ -26,6 +26,7 @@ pub(super) struct DataTable {
     quotes: Option<String>,
     trades: Option<String>,
     book: Option<String>,
+    actions: Option<String>,
     stamp: Option<Stamp>,
     #[serde(default, deserialize_with = "interval")]
     interval: Option<i64>,
@@ -63,11 +64,12 @@ pub(super) fn data_entry(
         (FeedKind::Quotes, table.quotes.take()),
         (FeedKind::Trades, table.trades.take()),
         (FeedKind::Book, table.book.take()),
+        (FeedKind::Actions, table.actions.take()),
     ];
     let mut named = kinds.into_iter().filter_map(|(kind, path)| path.map(|path| (kind, path)));
     let (Some((kind, path)), None) = (named.next(), named.next()) else {
         return Err(document
-            .error(&keys, "expected exactly one of `bars`, `quotes`, `trades` and `book`")
+            .error(&keys, "expected exactly one of `bars`, `quotes`, `trades`, `book` and `actions`")
             .hint("a second file of the same instrument has a [[data]] section of its own"));
     };
     if !instruments.iter().any(|i| i.symbol == table.symbol) {
@@ -99,6 +101,19 @@ fn check_keys(document: &Document, number: &str, table: &DataTable, kind: FeedKi
         let kinds: Vec<&str> = layout.kinds().iter().map(|kind| kind.word()).collect();
         let message = format!("a file of `{}` is not of the layout `{}`", kind.word(), layout.word());
         return refuse("layout", message, &format!("that layout has {}", listed(&kinds)));
+    }
+    if kind == FeedKind::Actions {
+        let keys = [
+            ("stamp", table.stamp.is_some()),
+            ("price_scale", table.price_scale.is_some()),
+            ("known_at", table.known_at.is_some()),
+            ("on_bad", table.on_bad != OnBad::default()),
+            ("reorder", table.reorder.is_some()),
+            ("max_gap", table.max_gap.is_some()),
+        ];
+        if let Some((key, _)) = keys.into_iter().find(|(_, there)| *there) {
+            return refuse(key, format!("dividends and splits have no `{key}`"), "drop the key");
+        }
     }
     let bars = kind == FeedKind::Bars;
     // Quote bars have a length, too.

@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use super::document::Document;
 use super::error::InputError;
+use super::margin_entry::MarginEntry;
 
 /// An instrument of a document.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -25,6 +26,12 @@ pub struct InstrumentEntry {
     /// When its market is open: the name of a calendar that comes with the program, or the path of a TOML table. Runs alone
     /// know it.
     pub calendar: Option<String>,
+    /// Currency of its prices, fees and dividends; none for that of the run.
+    pub currency: Option<String>,
+    /// Units of the underlying in one unit traded, a whole number above 0; none for 1.
+    pub multiplier: Option<f64>,
+    /// What equity a position requires; none for nothing beyond the run's `max_leverage`.
+    pub margin: Option<MarginEntry>,
 }
 
 impl InstrumentEntry {
@@ -66,9 +73,39 @@ pub(super) fn check_instruments(document: &Document, instruments: &[InstrumentEn
     Ok(())
 }
 
-/// Holds the instruments of a twin to have no calendar.
-pub(super) fn refuse_calendars(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
-    let Some(index) = instruments.iter().position(|instrument| instrument.calendar.is_some()) else { return Ok(()) };
-    let error = document.error(&["instrument", &index.to_string(), "calendar"], "a twin has no use for a calendar");
-    Err(error.hint("leave it out: a recording says itself when orders were filled"))
+/// Holds the terms on which instruments of a run are held to what they can be.
+pub(super) fn check_terms(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
+    for (index, instrument) in instruments.iter().enumerate() {
+        let number = index.to_string();
+        let whole = |multiplier: f64| multiplier.fract() == 0.0 && (1.0..=1e9).contains(&multiplier);
+        if let Some(multiplier) = instrument.multiplier.filter(|multiplier| !whole(*multiplier)) {
+            let error = document.error(&["instrument", &number, "multiplier"], "expected a whole number from 1 to 1e9");
+            return Err(error.found(multiplier).hint("it is 50 of a future on 50 times an index; 1 of a share"));
+        }
+        if instrument.currency.as_ref().is_some_and(String::is_empty) {
+            let error = document.error(&["instrument", &number, "currency"], "expected the name of a currency");
+            return Err(error.found_text("").hint("leave it out where it is that of the run"));
+        }
+        if let Some(margin) = &instrument.margin {
+            margin.check(document, &number)?;
+        }
+    }
+    Ok(())
+}
+
+/// Holds the instruments of a twin to say nothing of the account, which it has none of.
+pub(super) fn check_no_terms(document: &Document, instruments: &[InstrumentEntry]) -> Result<(), InputError> {
+    for (index, instrument) in instruments.iter().enumerate() {
+        let InstrumentEntry { calendar, currency, multiplier, margin, .. } = instrument;
+        if calendar.is_some() {
+            let error = document.error(&["instrument", &index.to_string(), "calendar"], "a twin has no use for a calendar");
+            return Err(error.hint("leave it out: a recording says itself when orders were filled"));
+        }
+        let there = [("currency", currency.is_some()), ("multiplier", multiplier.is_some()), ("margin", margin.is_some())];
+        if let Some((key, _)) = there.into_iter().find(|(_, there)| *there) {
+            let error = document.error(&["instrument", &index.to_string(), key], format!("only a run has the key `{key}`"));
+            return Err(error.hint("a twin knows prices and costs, and no account: drop the key"));
+        }
+    }
+    Ok(())
 }

@@ -14,8 +14,9 @@ use super::document::{Document, HINT};
 use super::error::InputError;
 use super::feed_format::{FeedFormat, check_file};
 use super::feed_rules::span;
-use super::instrument_entry::{InstrumentEntry, check_instruments};
+use super::instrument_entry::{InstrumentEntry, check_instruments, check_terms};
 use super::quantity::{MechanismEntry, check_mechanisms};
+use super::rate_entry::{RateEntry, RateSource, RateTable, rate_entries};
 use super::sweep_section::{SweepSection, SweepTable};
 use super::twin_file::AssumedPrice;
 use crate::sim2real::{Timestamp, written_instant};
@@ -30,6 +31,8 @@ pub struct RunFile {
     pub instruments: Vec<InstrumentEntry>,
     /// `[[data]]`.
     pub data: Vec<DataEntry>,
+    /// `[[rate]]`: what foreign currencies are worth.
+    pub rates: Vec<RateEntry>,
     /// `kind` of `[strategy]`; its other keys are read by [`strategy_settings`](Self::strategy_settings).
     pub strategy: String,
     /// `[[mechanism]]`: what stands between decision and fill.
@@ -78,6 +81,8 @@ pub enum FeedKind {
     Trades,
     /// Changes of an order book.
     Book,
+    /// Dividends and splits.
+    Actions,
 }
 
 impl FeedKind {
@@ -89,6 +94,7 @@ impl FeedKind {
             Self::Quotes => "quotes",
             Self::Trades => "trades",
             Self::Book => "book",
+            Self::Actions => "actions",
         }
     }
 }
@@ -118,6 +124,8 @@ struct RunTable {
     instrument: Vec<InstrumentEntry>,
     #[serde(default)]
     data: Vec<DataTable>,
+    #[serde(default)]
+    rate: Vec<RateTable>,
     strategy: StrategyKind,
     #[serde(default)]
     mechanism: Vec<MechanismEntry>,
@@ -153,16 +161,29 @@ impl RunFile {
                 check_file(&run.document, &["instrument", &index.to_string(), "calendar"], named)?;
             }
         }
+        for (index, rate) in run.rates.iter().enumerate() {
+            if let RateSource::File { path, .. } = &rate.source {
+                check_file(&run.document, &["rate", &index.to_string(), "file"], &path.to_string_lossy())?;
+            }
+        }
+        let whence = |rate: RateEntry| match rate.source {
+            RateSource::File { path, named, time, columns } => {
+                let path = run.document.resolve(&path);
+                RateEntry { source: RateSource::File { path, named, time, columns }, ..rate }
+            }
+            source => RateEntry { source, ..rate },
+        };
+        let rates = run.rates.into_iter().map(whence).collect();
         let resolved = |data: DataEntry| {
             let snapshot = data.format.snapshot.as_ref().map(|path| run.document.resolve(path));
             DataEntry { path: run.document.resolve(&data.path), format: FeedFormat { snapshot, ..data.format }, ..data }
         };
-        Ok(Self { data: run.data.into_iter().map(resolved).collect(), ..run })
+        Ok(Self { data: run.data.into_iter().map(resolved).collect(), rates, ..run })
     }
 
     /// The run of a document; the files it names are neither looked for nor resolved.
     pub(super) fn parse(document: Document) -> Result<Self, InputError> {
-        let RunTable { run, instrument, data, strategy, mechanism, sweep, .. } = document.parse()?;
+        let RunTable { run, instrument, data, rate, strategy, mechanism, sweep, .. } = document.parse()?;
         if !run.cash.is_finite() || run.cash < 0.0 {
             let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
             return Err(error.found(run.cash).hint("it is what the run starts with"));
@@ -180,6 +201,8 @@ impl RunFile {
                 .hint("swap or correct them"));
         }
         check_instruments(&document, &instrument)?;
+        check_terms(&document, &instrument)?;
+        let rates = rate_entries(&document, &run.currency, rate, &instrument)?;
         check_mechanisms(&document, &mechanism)?;
         let data = data
             .into_iter()
@@ -196,7 +219,7 @@ impl RunFile {
         }
         let sweep = sweep.map(|table| SweepSection::of(&document, table)).transpose()?;
         let strategy = strategy.kind;
-        let run = Self { document, run, instruments: instrument, data, strategy, mechanisms: mechanism, sweep };
+        let run = Self { document, run, instruments: instrument, data, rates, strategy, mechanisms: mechanism, sweep };
         run.sweep.iter().try_for_each(|sweep| run.check_sweep(sweep))?;
         Ok(run)
     }

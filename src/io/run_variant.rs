@@ -36,6 +36,7 @@ impl RunFile {
         let run = Self::parse(Document::from_text(self.document().path(), text));
         let mut run = run.map_err(|error| self.blamed(values, error))?;
         run.data.clone_from(&self.data);
+        run.rates.clone_from(&self.rates);
         Ok(run)
     }
 

@@ -12,7 +12,7 @@ use super::document::Document;
 use super::equation_sections::{AttachEntry, EquationSections, InputEntry, Named, OutputEntry, StateEntry, in_order};
 use super::error::InputError;
 use super::feed_format::{FeedFormat, check_file, zone};
-use super::instrument_entry::{InstrumentEntry, check_instruments, refuse_calendars};
+use super::instrument_entry::{InstrumentEntry, check_instruments, check_no_terms};
 use super::quantity::{MechanismEntry, Quantity, check_mechanisms};
 use super::relative_path::path_from;
 use super::stamp::Stamp;
@@ -187,7 +187,7 @@ impl TwinFile {
         }
         check_mechanisms(&document, &table.mechanism)?;
         check_instruments(&document, &table.instrument)?;
-        refuse_calendars(&document, &table.instrument)?;
+        check_no_terms(&document, &table.instrument)?;
         if let Some(assumptions) = &table.assumptions {
             check_assumptions(&document, assumptions)?;
         }

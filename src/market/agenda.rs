@@ -15,6 +15,8 @@ use super::{OrderId, Price, Quantity};
 pub(super) enum Phase {
     /// Before the data of the instant.
     Before,
+    /// Dividends and splits; bars that end at the instant go before them.
+    Acts,
     /// The data themselves.
     Data,
     /// The auction at the close of a day of trading: what the instant brought counts, what comes later does not.
@@ -48,6 +50,10 @@ pub(super) enum Due {
     Notice(usize),
     /// The strategy asked to be woken.
     Wake,
+    /// The broker takes an order back.
+    Revoke(OrderId),
+    /// A dividend or a split, by its number.
+    Action(usize),
 }
 
 /// What is due, in the order of time, phase, and then in the order in which it was put down.
@@ -67,6 +73,22 @@ impl Agenda {
     #[inline]
     pub fn peek(&self) -> Option<(Timestamp, Phase)> {
         self.due.peek().map(|Reverse((at, phase, ..))| (*at, *phase))
+    }
+
+    /// What is due next.
+    pub fn next_due(&self) -> Option<Due> {
+        self.due.peek().map(|Reverse((.., due))| *due)
+    }
+
+    /// Changes what is due, and drops that of which nothing is left; all else stays in its order.
+    pub fn revise(&mut self, mut revised: impl FnMut(Due) -> Option<Due>) {
+        // Sorted, what is due first comes last.
+        let all = std::mem::take(&mut self.due).into_sorted_vec();
+        let kept = all
+            .into_iter()
+            .rev()
+            .filter_map(|Reverse((at, phase, entry, due))| Some(Reverse((at, phase, entry, revised(due)?))));
+        self.due = kept.collect();
     }
 
     pub fn pop(&mut self) -> Option<(Timestamp, Due)> {

@@ -7,8 +7,8 @@ use crate::sim2real::{Assembly, Seed, Timestamp};
 use super::blotter::Blotter;
 use super::line::{Line, RowKind};
 use super::{
-    Calendar, Cash, DataNotes, Execution, Feed, History, Increments, Instrument, Latencies, LatencyError, Ledger,
-    LedgerError, Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy, StreamError,
+    Account, AccountRecord, Calendar, Cash, DataNotes, Execution, Feed, History, Increments, Instrument, Latencies,
+    LatencyError, Ledger, LedgerError, Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy, StreamError,
 };
 
 /// A backtest, as it was set up.
@@ -42,6 +42,8 @@ pub struct Settings {
     /// When the market of each instrument is open, in their order. Instruments without a calendar, as those behind the last
     /// here, trade whenever there are data, in days of UTC.
     pub calendars: Vec<Option<Arc<Calendar>>>,
+    /// How the account is kept; none for cash and prices in one currency, and nothing that happens to what is held.
+    pub account: Option<Arc<Account>>,
 }
 
 impl Settings {
@@ -49,8 +51,8 @@ impl Settings {
     #[must_use]
     pub fn with_cash(cash: Cash) -> Self {
         let (matching, latencies, calendars) = Default::default();
-        let (seed, max_leverage, reference, equity_every) = (Seed::default(), 1.0, None, None);
-        Self { cash, seed, max_leverage, reference, matching, latencies, equity_every, calendars }
+        let (seed, max_leverage, reference, equity_every, account) = (Seed::default(), 1.0, None, None, None);
+        Self { cash, seed, max_leverage, reference, matching, latencies, equity_every, calendars, account }
     }
 }
 
@@ -109,6 +111,48 @@ pub enum BacktestError {
         /// What is wrong.
         error: LedgerError,
     },
+    /// There is something in a currency of which nothing says yet what it is worth.
+    #[error(
+        "{place}: there is something in {currency}, and no rate of it is known yet\nhint: give [[rate]] a row that is no later than the first trade in {currency}, or a constant `value`"
+    )]
+    NoRate {
+        /// Where it came up.
+        place: String,
+        /// The currency.
+        currency: String,
+    },
+    /// A dividend or split within a bar, whose prices are then of before and after.
+    #[error(
+        "an action of {symbol} at {at} lies within the bar from {open_at} to {known_at}\nhint: the ex-instant is the open of the first bar without the dividend or after the split: check `ts` and `zone`"
+    )]
+    WithinBar {
+        /// Symbol of the instrument.
+        symbol: String,
+        /// The ex-instant.
+        at: Timestamp,
+        /// When the bar opens.
+        open_at: Timestamp,
+        /// When it is over.
+        known_at: Timestamp,
+    },
+    /// An account that does not say on which terms each instrument is held.
+    #[error(
+        "there are terms for {terms} of {instruments} instruments\nhint: give terms for each instrument, in their order"
+    )]
+    Terms {
+        /// Number of terms.
+        terms: usize,
+        /// Number of instruments.
+        instruments: usize,
+    },
+    /// An account that does not say what each currency is worth.
+    #[error("there are {rates} rates for {currencies} foreign currencies\nhint: give a rate for each but the first")]
+    Rates {
+        /// Number of rates.
+        rates: usize,
+        /// Number of currencies but the first.
+        currencies: usize,
+    },
     /// Mechanisms that give a price no market has.
     #[error(
         "order {order_id} for {symbol} at {time}: its mechanisms give a price of {price}\nhint: check the size of their parameters; impacts are for small parts of a day's volume"
@@ -165,6 +209,8 @@ pub struct Record {
     /// Of each instrument, rows from outside the sessions of its calendar, which no order met; none where it has no calendar,
     /// and nothing at all where no instrument has one.
     pub outside: Vec<Option<usize>>,
+    /// Corporate actions and margin calls.
+    pub account: AccountRecord,
 }
 
 /// What the data of an instrument were.
@@ -193,7 +239,7 @@ impl Backtest {
     /// A backtest of `instruments` on `histories` (one an instrument, in the same order), with orders filled by `venue`.
     ///
     /// # Errors
-    /// If there are no data, the two differ in number, or a tick size, lot size or the leverage cannot be.
+    /// If there are no data, the two differ in number, or a tick size, lot size, the leverage or the account cannot be.
     pub fn new(
         instruments: Vec<Instrument>,
         histories: Vec<History>,
@@ -247,6 +293,10 @@ impl Backtest {
             .iter()
             .map(|i| Increments::of(i).map_err(|error| BacktestError::Money { place: i.symbol.clone(), error }))
             .collect::<Result<_, _>>()?;
+        if let Some(account) = &settings.account {
+            account.check(&instruments)?;
+            account.check_actions(&instruments, &histories)?;
+        }
         Ok(Self { instruments, increments, histories, venue, settings })
     }
 

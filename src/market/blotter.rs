@@ -63,11 +63,35 @@ impl Status {
     }
 }
 
+/// Who sent an order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sender {
+    /// The strategy.
+    #[default]
+    Strategy,
+    /// The broker, to close what the account cannot carry.
+    Broker,
+}
+
+impl Sender {
+    /// Its word in tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Strategy => "strategy",
+            Self::Broker => "broker",
+        }
+    }
+}
+
 /// An order that was sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Order {
     /// Its id, from 1 in the order of decisions; those of orders that were refused are missing.
     pub order_id: u64,
+    /// Who sent it.
+    pub sender: Sender,
     /// Number of the instrument.
     pub instrument: usize,
     /// When it was decided; it is sent at once.
@@ -80,7 +104,7 @@ pub struct Order {
     pub time_in_force: TimeInForce,
     /// Which way.
     pub side: Side,
-    /// How much.
+    /// How much; after a split in new units, as is what was filled and the price at decision.
     pub quantity: Quantity,
     /// Close or mid when it was decided.
     pub decision_price: Price,
@@ -115,6 +139,10 @@ pub struct Fill {
     pub price: Price,
     /// Fee.
     pub fee: Cash,
+    /// The price at decision, as it was when it was filled.
+    pub decision_price: Price,
+    /// Base currency for one unit of the instrument's, as far as it was known; 1 where they are the same.
+    pub rate: f64,
     /// What it realised on a position it closed, before its fee; none where it closed nothing.
     pub realised: Option<Cash>,
     /// What it cost against the price at decision.
@@ -140,7 +168,7 @@ pub struct Why {
     pub queued_behind: f64,
 }
 
-/// What a fill cost against the price at decision, a positive number being a loss [currency]; the parts and the fee add
+/// What a fill cost against the price at decision, a positive number being a loss [currency of the instrument]; the parts and the fee add
 /// up to its implementation shortfall.
 ///
 /// Source: Perold, "The implementation shortfall: paper versus reality", Journal of Portfolio Management 14 (1988).

@@ -56,8 +56,9 @@ impl Session<'_> {
                 self.charge_held(instrument, at)?;
                 self.book(k, &outcome, &filled)?;
                 let terms = self.mail.terms(place);
+                let (one, quantity) = (self.worth_of_one(instrument), filled.quantity.to_f64());
                 for (mechanism, term) in self.venue.conceding.iter().zip(terms) {
-                    *self.blotter.concessions.entry(mechanism).or_default() += term * filled.quantity.to_f64();
+                    *self.blotter.concessions.entry(mechanism).or_default() += term * quantity * one;
                 }
                 self.blotter.terms.extend_from_slice(terms);
                 let order = &self.blotter.orders[k];
@@ -86,6 +87,7 @@ impl Session<'_> {
     /// Books a fill of order `k`.
     fn book(&mut self, k: usize, outcome: &Outcome, filled: &Filled) -> Result<(), BacktestError> {
         let Outcome { id, instrument, at, .. } = *outcome;
+        let rate = self.rate_of(self.ledger.positions()[instrument].currency);
         let order = &mut self.blotter.orders[k];
         let symbol = &self.setup.instruments[instrument].symbol;
         let money = |error| BacktestError::Money { place: format!("order {} for {symbol} at {at}", id.0), error };
@@ -97,7 +99,9 @@ impl Session<'_> {
         if order.filled >= order.quantity {
             (order.status, order.reason) = (Status::Filled, None);
         }
-        let loss = |from: f64, to: f64| side.sign() * (to - from) * quantity.to_f64();
+        let position = &self.ledger.positions()[instrument];
+        let units = quantity.to_f64() * position.multiplier.get() as f64;
+        let loss = |from: f64, to: f64| side.sign() * (to - from) * units;
         let cost = FillCost {
             timing: loss(order.decision_price.to_f64(), filled.mid),
             spread_and_impact: loss(filled.mid, filled.model_price),
@@ -121,6 +125,8 @@ impl Session<'_> {
             quantity,
             price,
             fee,
+            decision_price: order.decision_price,
+            rate,
             realised: closes.then_some(realised),
             cost,
             why,

@@ -4,7 +4,7 @@ use crate::sim2real::Timestamp;
 
 use super::backtest::BacktestError;
 use super::session::Session;
-use super::{Cash, ChargeKind, InFlight, LedgerError, Quantity, Role, Side};
+use super::{Cash, InFlight, LedgerError, Quantity, Role, Side};
 
 /// Length of a day of UTC [ns].
 const DAY: i64 = 86_400 * Timestamp::NANOS;
@@ -28,7 +28,7 @@ impl Session<'_> {
     /// charged goes by the time held, over nights and weekends, and not by when it is booked.
     #[inline]
     pub(super) fn carry_over(&mut self, now: Timestamp) -> Result<(), BacktestError> {
-        if now < self.carry.next || !self.venue.charges {
+        if now < self.carry.next || self.venue.charges.is_empty() {
             return Ok(());
         }
         self.carry.next = Timestamp((now.0.div_euclid(DAY) + 1).saturating_mul(DAY));
@@ -42,7 +42,7 @@ impl Session<'_> {
 
     /// Charges what is held of `instrument` for the time since it was charged last: to be done before it changes.
     pub(super) fn charge_held(&mut self, instrument: usize, now: Timestamp) -> Result<(), BacktestError> {
-        if !self.venue.charges {
+        if self.venue.charges.is_empty() {
             return Ok(());
         }
         // Word of a fill may come after the day it belongs to was charged.
@@ -56,12 +56,22 @@ impl Session<'_> {
         let side = if position.quantity > Quantity::ZERO { Side::Buy } else { Side::Sell };
         let mid = mark.to_f64();
         let held = InFlight::market(side, position.quantity.abs().to_f64(), since, mid, mid).as_a(Role::Holder);
-        let charge = self.venue.floors[instrument].charge(&held, mid, now);
+        let held = held.of(position.multiplier);
         let place = || format!("{} at {now}", self.setup.instruments[instrument].symbol);
-        let amount = Cash::nearest(charge).map_err(|error| BacktestError::Money { place: place(), error })?;
-        self.ledger.charge(instrument, amount, ChargeKind::Other).map_err(|error| match error {
-            LedgerError::Money(error) => BacktestError::Money { place: place(), error },
-            other => BacktestError::Account { place: place(), error: other },
-        })
+        let failed = |error| BacktestError::Money { place: place(), error };
+        let mut sums = Vec::with_capacity(self.venue.charges.len());
+        self.venue.floors[instrument].charge(&held, mid, now, |_, sum| sums.push(sum));
+        let mut booked = Cash::ZERO;
+        for (sum, kind) in sums.into_iter().zip(&self.venue.charges) {
+            // Sums are rounded, so that what all charge together is rounded once.
+            let sum = Cash::nearest(sum).map_err(failed)?;
+            let amount = sum.minus(booked).map_err(failed)?;
+            booked = sum;
+            self.ledger.charge(instrument, amount, *kind).map_err(|error| match error {
+                LedgerError::Money(error) => failed(error),
+                other => BacktestError::Account { place: place(), error: other },
+            })?;
+        }
+        Ok(())
     }
 }

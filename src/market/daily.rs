@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use crate::sim2real::Timestamp;
 
 use super::Price;
+use super::account::Ratio;
 
 const DAY: i64 = 86_400 * Timestamp::NANOS;
 
@@ -56,6 +57,16 @@ impl Daily {
         }
         self.volume += volume;
         self.close = price;
+    }
+
+    /// What was seen is told in the units of after a split, which is no return.
+    pub(super) fn split(&mut self, ratio: Ratio) {
+        let units = ratio.to_f64();
+        self.close = ratio.price(self.close);
+        self.volume *= units;
+        self.volumes.iter_mut().for_each(|volume| *volume *= units);
+        self.closes.iter_mut().for_each(|close| *close /= units);
+        self.mean_volume = self.mean_volume.map(|volume| volume * units);
     }
 
     fn turn(&mut self, time: Timestamp) {

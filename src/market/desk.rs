@@ -7,8 +7,8 @@ use super::backtest::BacktestError;
 use super::session::Session;
 use super::venue::{Outcome, Resting, What};
 use super::{
-    Cash, Condition, InFlight, Link, OpenOrder, Order, OrderId, Price, Quantity, Reason, Rejection, Request, Role, Side,
-    Status, Ticket, TimeInForce,
+    Cash, Condition, InFlight, Link, OpenOrder, Order, OrderId, Price, Quantity, Reason, Rejection, Request, Role, Sender,
+    Side, Status, Ticket, TimeInForce,
 };
 
 impl Session<'_> {
@@ -18,7 +18,7 @@ impl Session<'_> {
         for request in orders.requests() {
             match *request {
                 Request::Submit(id, ticket) => match self.admit(id, &ticket, now, equity.to_f64()) {
-                    Ok(price) => self.send(id, &ticket, now, price),
+                    Ok(price) => self.send(id, &ticket, now, price, Sender::Strategy),
                     Err(reason) => {
                         let Ticket { instrument, side, quantity, .. } = ticket;
                         self.blotter.reject(Rejection { decided_at: now, instrument, side, quantity, reason });
@@ -67,11 +67,14 @@ impl Session<'_> {
             return Err(Reason::Unlinked);
         }
         let price = self.known[ticket.instrument].mark.ok_or(Reason::NoPrice)?;
-        if ticket.condition == Condition::ReduceOnly || self.carries(ticket, equity) {
-            Ok(price)
-        } else {
-            Err(Reason::Leverage)
+        if ticket.condition == Condition::ReduceOnly {
+            return Ok(price);
         }
+        if !self.carries(ticket, equity) {
+            return Err(Reason::Leverage);
+        }
+        let requires = self.keeping.as_ref().is_some_and(|keeping| keeping.margin);
+        if requires && !self.has_margin_for(ticket) { Err(Reason::Margin) } else { Ok(price) }
     }
 
     /// Whether the account can carry an order at the prices of now: what is held with all that is under way stays within
@@ -81,14 +84,15 @@ impl Session<'_> {
         for (k, (position, known)) in self.ledger.positions().iter().zip(&self.known).enumerate() {
             let coming = position.quantity + known.working;
             let mark = known.mark.unwrap_or_default();
-            before += (mark * coming).to_f64().abs();
+            let one = self.worth_of_one(k);
+            before += (mark * coming).to_f64().abs() * one;
             let then = if k == ticket.instrument { coming + ticket.quantity.signed(ticket.side) } else { coming };
-            after += (mark * then).to_f64().abs();
+            after += (mark * then).to_f64().abs() * one;
         }
         after <= before || after <= self.setup.settings.max_leverage * equity
     }
 
-    fn send(&mut self, id: OrderId, ticket: &Ticket, now: Timestamp, price: Price) {
+    pub(super) fn send(&mut self, id: OrderId, ticket: &Ticket, now: Timestamp, price: Price, sender: Sender) {
         let Ticket { instrument, side, quantity, kind, time_in_force, condition, link } = *ticket;
         let (about, daily) = (&self.setup.instruments[instrument], &self.daily[instrument]);
         let mid = price.to_f64();
@@ -101,12 +105,17 @@ impl Session<'_> {
             assumed: mid,
             mid,
             participation_limit: f64::INFINITY,
+            multiplier: self.ledger.terms()[instrument].multiplier.get() as f64,
             average_daily_volume: about.average_daily_volume.or_else(|| daily.volume()),
             daily_volatility: about.daily_volatility.or_else(|| daily.volatility()),
         };
         // Laws of commands say when it arrives and how much of a volume it may be; its quantity is its owner's.
         let shaped = self.venue.floors[instrument].shape(&decided);
-        let order = shaped.arriving(self.clocks.order(shaped.arrives_at));
+        let order = shaped.arriving(match sender {
+            Sender::Strategy => self.clocks.order(shaped.arrives_at),
+            // Who sends it sits at the exchange.
+            Sender::Broker => now,
+        });
         let child = matches!(link, Link::ChildOf { .. });
         let resting = Resting::new(id, ticket, order, quantity);
         let known = &mut self.known[instrument];
@@ -115,9 +124,12 @@ impl Session<'_> {
             Some(book) => [Side::Buy, Side::Sell].map(|side| book.best(side).map(Price::to_f64)).into(),
             None => (quote.and_then(|quote| quote.bid()), quote.and_then(|quote| quote.ask())),
         };
-        known.opened(OpenOrder { id, side, kind, left: quantity, closes: child || condition == Condition::ReduceOnly });
+        // What the broker closes is as good as closed, and nothing is to be done about it.
+        let closes = sender == Sender::Strategy && (child || condition == Condition::ReduceOnly);
+        known.opened(OpenOrder { id, side, kind, left: quantity, closes });
         self.blotter.orders.push(Order {
             order_id: id.0,
+            sender,
             instrument,
             decided_at: now,
             arrives_at: order.arrives_at,
@@ -149,9 +161,10 @@ impl Session<'_> {
 
     /// Sends a message about an order.
     fn post(&mut self, id: OrderId, now: Timestamp, due: Due) {
-        if self.blotter.place(id).is_none() {
-            self.refuse(Reason::UnknownOrder);
-            return;
+        match self.blotter.place(id).map(|k| self.blotter.orders[k].sender) {
+            Some(Sender::Strategy) => {}
+            Some(Sender::Broker) => return self.refuse(Reason::NotOwn),
+            None => return self.refuse(Reason::UnknownOrder),
         }
         let at = self.clocks.order(now);
         self.agenda.put(at, phase(now, at), due);
@@ -169,6 +182,7 @@ impl Session<'_> {
                 }
                 None => self.withdraw(id, at, Reason::TimeInForce),
             },
+            Due::Revoke(id) => self.withdraw(id, at, Reason::Liquidated),
             Due::Replace(id, quantity, price) => self.amend(id, quantity, price, at),
             Due::Open(instrument) => {
                 self.open_bar(instrument);
@@ -178,6 +192,7 @@ impl Session<'_> {
                 self.close_day(instrument, at);
                 Some(instrument)
             }
+            Due::Action(number) => return self.take_action(number, at, None),
             Due::Notice(_) | Due::Wake => None,
         };
         match instrument {
@@ -205,7 +220,7 @@ impl Session<'_> {
     }
 
     /// An order is taken back, wherever it is.
-    fn withdraw(&mut self, id: OrderId, at: Timestamp, reason: Reason) -> Option<usize> {
+    pub(super) fn withdraw(&mut self, id: OrderId, at: Timestamp, reason: Reason) -> Option<usize> {
         if let Some((instrument, order)) = self.sent.remove(&id) {
             // It was on its way still; what waited for it waits in vain.
             let children: Vec<OrderId> =

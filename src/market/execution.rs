@@ -42,6 +42,8 @@ pub struct Report {
     pub price: f64,
     /// Quantity filled [units].
     pub quantity: f64,
+    /// Units of the underlying in one unit traded.
+    pub multiplier: f64,
     /// Fee [currency].
     pub fee: f64,
     /// Cost against the assumed price, a positive number being a loss [bps of the mid at decision].
@@ -60,6 +62,7 @@ impl Default for Report {
             until: Timestamp::default(),
             price: 0.0,
             quantity: 0.0,
+            multiplier: 1.0,
             fee: 0.0,
             cost: 0.0,
             filled: 0.0,
@@ -78,6 +81,7 @@ impl Report {
             until: order.arrives_at,
             price,
             quantity,
+            multiplier: order.multiplier,
             fee: 0.0,
             cost: cost_bps(order.side, price, order.assumed, order.mid),
             filled: quantity / order.quantity,
@@ -96,10 +100,10 @@ impl Report {
         self.role != Role::Holder
     }
 
-    /// What changed hands, or is held [currency].
+    /// What changed hands, or is held, multiplier included [currency].
     #[must_use]
     pub fn notional(&self) -> f64 {
-        self.price * self.quantity
+        self.price * self.quantity * self.multiplier
     }
 }
 

@@ -11,6 +11,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::sim2real::{Draws, Seed, Timestamp};
 
+use super::account::Ratio;
+
 /// How long a message takes.
 ///
 /// Source: constant and measured latency as in Moallemi & Sağlam, "The cost of latency", Operations Research 61 (2013); a
@@ -257,6 +259,11 @@ impl Clocks {
             watch.variance_a_second = watch.variance_a_second * (-passed / 60.0).exp() + moved * moved / 60.0;
         }
         (watch.at, watch.price) = (at, price);
+    }
+
+    /// A split is no move of the price.
+    pub fn split(&mut self, ratio: Ratio) {
+        self.strain.price /= ratio.to_f64();
     }
 
     /// By how much messages take longer than they would.

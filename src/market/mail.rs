@@ -39,6 +39,11 @@ impl Mail {
         Some(outcome)
     }
 
+    /// Whether what is on its way at a place is of that instrument.
+    pub fn is_of(&self, place: usize, instrument: usize) -> bool {
+        self.slots.get(place).is_some_and(|slot| slot.is_some_and(|outcome| outcome.instrument == instrument))
+    }
+
     /// The terms of the fill that was last at a place.
     pub fn terms(&self, place: usize) -> &[f64] {
         &self.terms[place * self.count..(place + 1) * self.count]

@@ -1,5 +1,8 @@
 //! Markets: what is traded, the backtest that trades it, and `execution`, the plant every order meets.
 
+mod account;
+#[cfg(feature = "io")]
+mod account_file;
 mod agenda;
 mod audit;
 mod backtest;
@@ -11,6 +14,7 @@ mod calendar;
 mod carry;
 mod check;
 mod checkpoint;
+mod corporate_action;
 mod covariate;
 mod daily;
 mod data_notes;
@@ -35,6 +39,7 @@ mod log_entry;
 #[cfg(feature = "io")]
 mod log_folder;
 mod mail;
+mod margin_call;
 pub mod mechanism;
 pub mod metric;
 mod money;
@@ -44,10 +49,13 @@ mod own_print;
 mod past;
 mod price_assumption;
 mod quote;
+mod rates;
 mod reason;
 mod row_check;
 #[cfg(feature = "io")]
 mod run;
+#[cfg(feature = "io")]
+mod run_beside;
 #[cfg(feature = "io")]
 mod run_calendar;
 #[cfg(feature = "io")]
@@ -76,13 +84,14 @@ mod venue;
 #[cfg(feature = "io")]
 pub mod walk_forward;
 
+pub use account::{Account, AccountRecord, ActionKind, BookedAction, CorporateAction, MarginCall, Rate};
 pub use audit::{
     Audit, AuditSettings, AuditVerdict, Change, Cut, Difference, Engine, FillFault, Impossible, KnownEarly, Subject, audit,
     audit_engine,
 };
 pub use backtest::{Backtest, BacktestError, DataSeen, EquityPoint, Held, Record, Settings};
 pub use bar::Bar;
-pub use blotter::{Blotter, Fill, FillCost, Order, Rejection, Status, Why};
+pub use blotter::{Blotter, Fill, FillCost, Order, Rejection, Sender, Status, Why};
 pub use book::{Book, Level, Walk};
 pub use calendar::{
     Calendar, CalendarError, CalendarFault, CalendarTable, Day, Hours, LocalTime, Observed, OccasionRow, SessionRow, Trading,

@@ -2,7 +2,7 @@
 
 use crate::sim2real::{Command, DelayLine, Tick, Timestamp};
 
-use super::Price;
+use super::{Multiplier, Price};
 
 /// Which way an order trades.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -100,6 +100,8 @@ pub struct InFlight {
     pub mid: f64,
     /// The largest part of the volume it meets that it may take; infinite where nothing limits it.
     pub participation_limit: f64,
+    /// Units of the underlying in one unit traded.
+    pub multiplier: f64,
     /// Units traded on an average day, where known.
     pub average_daily_volume: Option<f64>,
     /// Standard deviation of the daily return (a fraction), where known.
@@ -120,6 +122,7 @@ impl InFlight {
             assumed,
             mid,
             participation_limit: f64::INFINITY,
+            multiplier: 1.0,
             average_daily_volume: None,
             daily_volatility: None,
         }
@@ -129,6 +132,13 @@ impl InFlight {
     #[must_use]
     pub fn as_a(mut self, role: Role) -> Self {
         self.role = role;
+        self
+    }
+
+    /// The same order of units that each are so many of the underlying.
+    #[must_use]
+    pub fn of(mut self, multiplier: Multiplier) -> Self {
+        self.multiplier = multiplier.get() as f64;
         self
     }
 

@@ -20,6 +20,8 @@ pub enum Reason {
     NoPrice,
     /// It would take what is held beyond the run's largest leverage.
     Leverage,
+    /// It requires more initial margin than the equity is above that of what is held.
+    Margin,
     /// It is for the open or the close, and nothing tells what that was: neither bars nor a calendar, or no price was
     /// known at it.
     NoAuction,
@@ -47,6 +49,10 @@ pub enum Reason {
     Asked,
     /// The account could not carry it any longer.
     Liquidated,
+    /// After a split its price is on no tick, or its quantity no whole number of lots.
+    Split,
+    /// It is about an order of the broker's.
+    NotOwn,
 }
 
 impl Reason {
@@ -60,6 +66,7 @@ impl Reason {
             Self::OffTick => "off_tick",
             Self::NoPrice => "no_price",
             Self::Leverage => "leverage",
+            Self::Margin => "margin",
             Self::NoAuction => "no_auction",
             Self::MarketClosed => "market_closed",
             Self::Late => "late",
@@ -73,6 +80,8 @@ impl Reason {
             Self::Linked => "linked",
             Self::Asked => "asked",
             Self::Liquidated => "liquidated",
+            Self::Split => "split",
+            Self::NotOwn => "not_own",
         }
     }
 }
@@ -86,6 +95,7 @@ impl fmt::Display for Reason {
             Self::OffTick => "a price is not above 0 or not on a tick",
             Self::NoPrice => "the instrument has had no price yet",
             Self::Leverage => "it would exceed the run's largest leverage",
+            Self::Margin => "it requires more initial margin than there is",
             Self::NoAuction => "it is for the open or the close, which its data do not tell",
             Self::MarketClosed => "it could not wait, and came while the market was closed",
             Self::Late => "its time was over before it was sent",
@@ -99,6 +109,8 @@ impl fmt::Display for Reason {
             Self::Linked => "an order it was linked with was filled, or never will be",
             Self::Asked => "its owner asked",
             Self::Liquidated => "the account could not carry it any longer",
+            Self::Split => "a split took it off ticks or lots",
+            Self::NotOwn => "it is about an order of the broker's",
         })
     }
 }

@@ -7,7 +7,8 @@ use chrono_tz::Tz;
 use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash, listed_mechanism};
 use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 
-use super::run_calendar::ReadCalendars;
+use super::account_file::account;
+use super::run_beside::Beside;
 use super::run_log::InputFile;
 use super::{
     Backtest, BacktestError, Calendar, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError,
@@ -23,7 +24,8 @@ pub struct PreparedRun {
     pub provenance: Provenance,
     /// The run whose files are read while it goes; none where its data are in memory.
     pub(super) streamed: Option<Box<RunFile>>,
-    pub(super) calendars: ReadCalendars,
+    /// What was read beside its market data.
+    pub(super) beside: Beside,
 }
 
 /// Sets up the backtest of `run`, and reads its data. The strategy is for the caller to build, from `run.strategy` and
@@ -36,19 +38,18 @@ pub struct PreparedRun {
 pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     // What needs no data is said before they are read.
     venue(run)?;
-    let mut calendars = ReadCalendars::default();
-    calendars.of(run)?;
-    let (mut inputs, mut read) = (calendars.files.clone(), Vec::new());
+    let beside = Beside::read(run)?;
+    let (mut rows, mut read) = (Vec::new(), Vec::new());
     for entry in &run.data {
-        let history = history(entry)?;
-        let rows = history.rows();
-        inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: Some(rows) });
-        read.push(Some(history));
+        let history = if entry.kind == FeedKind::Actions { None } else { Some(history(entry)?) };
+        rows.push(history.as_ref().map(History::rows));
+        read.push(history);
     }
     let joined = run.instruments.iter().enumerate().map(|(index, entry)| joined(run, index, &entry.symbol, &mut read));
     let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
-    let backtest = set_up(run, histories, &mut calendars)?;
-    Ok(PreparedRun { provenance: provenance(run, &backtest, inputs)?, backtest, streamed: None, calendars })
+    let backtest = set_up(run, histories, &beside)?;
+    let provenance = provenance(run, &backtest, beside.inputs(run, &rows)?)?;
+    Ok(PreparedRun { provenance, backtest, streamed: None, beside })
 }
 
 /// What `backtest`, that of `run`, is made of: its document and `files`.
@@ -68,16 +69,16 @@ pub(super) fn provenance(run: &RunFile, backtest: &Backtest, files: Vec<InputFil
 }
 
 /// The backtest of `run` on data that were read.
-fn set_up(run: &RunFile, histories: Vec<History>, calendars: &mut ReadCalendars) -> Result<Backtest, InputError> {
+fn set_up(run: &RunFile, histories: Vec<History>, beside: &Beside) -> Result<Backtest, InputError> {
     let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     let venue = venue(run)?;
     run_needs::check(run, &venue, &instruments, &histories)?;
-    let settings = settings(run, &histories, calendars)?;
+    let settings = settings(run, &histories, beside)?;
     Backtest::new(instruments, histories, venue, settings).map_err(|error| explained(run, &error))
 }
 
 /// What else the backtest of `run` depends on.
-pub(super) fn settings(run: &RunFile, histories: &[History], calendars: &mut ReadCalendars) -> Result<Settings, InputError> {
+pub(super) fn settings(run: &RunFile, histories: &[History], beside: &Beside) -> Result<Settings, InputError> {
     let cash = Cash::nearest(run.run.cash).map_err(|error| money(run, &["run", "cash"], &error))?;
     let borrowing_nothing = Settings::with_cash(cash);
     Ok(Settings {
@@ -88,7 +89,8 @@ pub(super) fn settings(run: &RunFile, histories: &[History], calendars: &mut Rea
         matching: run.matching::<Matching>()?,
         latencies: run.latency::<Latencies>()?,
         equity_every: run.run.equity_every.or(run.run.stream.then_some(60 * Timestamp::NANOS)),
-        calendars: calendars.of(run)?,
+        calendars: beside.calendars.clone().of(run)?,
+        account: account(run, beside.account.clone())?,
     })
 }
 
@@ -98,7 +100,7 @@ impl PreparedRun {
     /// # Errors
     /// As [`prepare_run`], but for what it says of files.
     pub fn variant(&self, run: &RunFile) -> Result<Backtest, InputError> {
-        set_up(run, self.backtest.histories().to_vec(), &mut self.calendars.clone())
+        set_up(run, self.backtest.histories().to_vec(), &self.beside)
     }
 
     /// All that `record`, the record of this backtest, is shown as.
@@ -109,7 +111,7 @@ impl PreparedRun {
         let mut provenance = self.provenance.clone();
         if let Some(run) = &self.streamed {
             // Only now is known how many rows the files have.
-            let files = 1 + self.calendars.files.len();
+            let files = 1 + self.beside.calendars.files.len();
             for (entry, file) in run.data.iter().zip(provenance.inputs.iter_mut().skip(files)) {
                 let instrument = run.instruments.iter().position(|instrument| instrument.symbol == entry.symbol);
                 let seen = instrument.and_then(|k| record.data.get(k));
@@ -130,7 +132,8 @@ fn calendar_names(run: &RunFile, backtest: &Backtest) -> BTreeMap<String, String
 
 /// The zone of the data's times, where they have one in common.
 fn zone(run: &RunFile) -> Tz {
-    let mut zones = run.data.iter().map(|entry| entry.format.time.zone);
+    let market = run.data.iter().filter(|entry| entry.kind != FeedKind::Actions);
+    let mut zones = market.map(|entry| entry.format.time.zone);
     let first = zones.next().unwrap_or(Tz::UTC);
     if zones.all(|zone| zone == first) { first } else { Tz::UTC }
 }
@@ -154,6 +157,8 @@ pub(super) fn venue(run: &RunFile) -> Result<Assembly<Execution>, InputError> {
 /// The history in a data file.
 fn history(entry: &DataEntry) -> Result<History, InputError> {
     match entry.kind {
+        // They are no data of a market.
+        FeedKind::Actions => Ok(History::default()),
         FeedKind::Bars => History::read_bars(&entry.path, &entry.format, entry.interval),
         FeedKind::Quotes => History::read_quote_bars(&entry.path, &entry.format, entry.interval),
         FeedKind::Trades => History::read_trades(&entry.path, &entry.format),
@@ -228,10 +233,16 @@ pub fn explained(run: &RunFile, error: &BacktestError) -> InputError {
     {
         return error.clone();
     }
+    if let BacktestError::WithinBar { symbol, .. } = error {
+        let of = |entry: &DataEntry| entry.kind == FeedKind::Actions && entry.symbol == *symbol;
+        let number = run.data.iter().position(of).unwrap_or_default().to_string();
+        return split(run, &["data", &number, "actions"], &error.to_string());
+    }
     let keys: &[&str] = match error {
         BacktestError::Leverage(_) => &["run", "max_leverage"],
         BacktestError::ModelPrice { .. } => &["mechanism"],
         BacktestError::Latency(_) => &["latency"],
+        BacktestError::NoRate { .. } => &["rate"],
         BacktestError::Queue(_) => &["matching", "queue"],
         BacktestError::EquityEvery(_) => &["run", "equity_every"],
         _ => &["run"],

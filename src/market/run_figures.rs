@@ -29,12 +29,46 @@ pub(super) fn key_figures(summary: &RunSummary) -> Vec<Metric> {
 pub(super) fn figure_groups(summary: &RunSummary) -> Vec<FigureGroup> {
     let told = Told { summary };
     let group = |title: &str, figures: Vec<Metric>| FigureGroup { title: title.to_owned(), figures };
-    vec![
+    let mut groups = vec![
         group("Return", told.of_return()),
         group("Risk", told.of_risk()),
         group("Trading", told.of_trading()),
         group("Costs", told.of_costs()),
-    ]
+    ];
+    let account = account_figures(summary);
+    if !account.is_empty() {
+        groups.push(group("Account", account));
+    }
+    groups
+}
+
+/// What came and went without a trade, and what there is of each currency; nothing where that is cash alone.
+fn account_figures(summary: &RunSummary) -> Vec<Metric> {
+    let (counts, several) = (&summary.counts, summary.account.len() > 1);
+    let mut figures = Vec::new();
+    for of in &summary.account {
+        let money = |amount: f64| Some(with_unit(&decimals(amount, 2), &of.currency));
+        let mut add = |name: &str, amount: f64, help: &str| {
+            if amount != 0.0 {
+                figures.push(figure(name, money(amount), help));
+            }
+        };
+        if several {
+            add(&format!("Cash in {}", of.currency), of.cash, "At the end; below 0 where it is owed.");
+        }
+        add("Dividends", of.dividends, "Before tax; those paid when short are subtracted.");
+        add("Tax withheld", of.withheld, "From dividends of long positions.");
+        add("Borrow fees", of.charges.borrow, "Charged on what was sold short.");
+        add("Funding", of.charges.funding, "Of perpetual futures; below 0 where it was received.");
+        add("Interest", of.charges.interest, "On cash; below 0 where it was received.");
+        add("Other charges", of.charges.other, "On what was held.");
+    }
+    if counts.margin_calls > 0 {
+        let calls = Some(decimals(counts.margin_calls as f64, 0));
+        let help = format!("Equity fell below maintenance; the broker sent {} orders.", counts.broker_orders);
+        figures.push(figure("Margin calls", calls, help));
+    }
+    figures
 }
 
 /// A figure: its name, its value where it is defined, and what it is.

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 use crate::io::{InputError, OutputFolder, OutputTable};
 use crate::report::{BacktestPage, ReportError};
 
-use super::metric::{Counts, InstrumentSummary, Metrics, RoundTrip};
+use super::metric::{Counts, CurrencySummary, InstrumentSummary, Metrics, RoundTrip};
 use super::run_page::run_page;
 use super::{Backtest, DataSummary, Instrument, MoneyError, Price, Record, Reference};
 
@@ -64,6 +64,8 @@ pub struct RunSummary {
     pub metrics: Metrics,
     /// How many of everything.
     pub counts: Counts,
+    /// Cash, dividends, tax and charges, currency by currency.
+    pub account: Vec<CurrencySummary>,
     /// Instrument by instrument.
     pub instruments: Vec<InstrumentSummary>,
     /// What was found in the data, file by file.
@@ -79,12 +81,14 @@ impl RunSummary {
     /// # Errors
     /// If an amount of cash is beyond what can be held.
     pub fn new(provenance: Provenance, record: &Record, instruments: &[Instrument]) -> Result<Self, MoneyError> {
+        let account = CurrencySummary::of(record, &provenance.currency)?;
         Ok(Self {
             schema: Self::SCHEMA,
             provenance,
             metrics: Metrics::of(record)?,
             counts: Counts::of(record),
-            instruments: InstrumentSummary::of(record, instruments),
+            account,
+            instruments: InstrumentSummary::of(record, instruments)?,
             data: DataSummary::of(record, instruments),
         })
     }
@@ -136,7 +140,7 @@ impl RunOutputs {
         Ok(Self {
             orders: record.orders_table(backtest.instruments(), &summary.provenance.strategy),
             fills: record.fills_table(),
-            trades: trades_table(&trips, backtest.instruments()),
+            trades: trades_table(&trips, &summary),
             equity: record.equity_table(),
             page: run_page(&summary, backtest, record, &trips),
             summary,
@@ -168,10 +172,14 @@ impl RunOutputs {
 }
 
 /// `trades`, the round trips in the order in which they were entered: `trade_id, symbol, side ("long", "short"), entered_at,
-/// exited_at, seconds, qty, entry_price, exit_price, gross, fees, net, return, fills`; `exited_at` is empty where something is
-/// still held, and `gross` then counts it at its last price.
-fn trades_table(trips: &[RoundTrip], instruments: &[Instrument]) -> OutputTable {
-    let symbol = |k: usize| instruments.get(k).map(|i| i.symbol.clone());
+/// exited_at, seconds, qty, entry_price, exit_price, gross, fees, net, return, fills, currency, rate`; `exited_at` is empty where
+/// something is still held, and `gross` then counts it at its last price. Amounts are in `currency`, and `rate` is what one
+/// unit of that was worth at the end of the trip in the currency of the run.
+fn trades_table(trips: &[RoundTrip], summary: &RunSummary) -> OutputTable {
+    let of = |k: usize| summary.instruments.get(k);
+    let symbol = |k: usize| of(k).map(|i| i.symbol.clone());
+    let base = &summary.provenance.currency;
+    let currency = |k: usize| of(k).map(|i| i.currency.as_ref().unwrap_or(base).clone());
     OutputTable::new()
         .integers("trade_id", (1..=trips.len()).map(|k| k as i64))
         .texts("symbol", trips.iter().map(|t| symbol(t.instrument)))
@@ -187,11 +195,13 @@ fn trades_table(trips: &[RoundTrip], instruments: &[Instrument]) -> OutputTable 
         .floats("net", trips.iter().map(|t| t.net.to_f64()))
         .floats("return", trips.iter().map(RoundTrip::growth))
         .integers("fills", trips.iter().map(|t| t.fills as i64))
+        .texts("currency", trips.iter().map(|t| currency(t.instrument)))
+        .floats("rate", trips.iter().map(|t| t.rate))
 }
 
 impl Record {
     /// `orders`: `order_id, symbol, decided_at, side, qty, type, limit_price, submitted_at, strategy, seen_bid, seen_ask`,
-    /// and beyond the contract's columns `status, filled_qty, stop_price, time_in_force, arrives_at, reason`. Orders that were
+    /// and beyond the contract's columns `status, filled_qty, stop_price, time_in_force, arrives_at, reason, sent_by ("strategy", "broker")`. Orders that were
     /// refused before they were sent are not here.
     #[must_use]
     pub fn orders_table(&self, instruments: &[Instrument], strategy: &str) -> OutputTable {
@@ -215,6 +225,7 @@ impl Record {
             .texts("time_in_force", orders.iter().map(|o| o.time_in_force.word().to_owned()))
             .times("arrives_at", orders.iter().map(|o| o.arrives_at))
             .texts("reason", orders.iter().map(|o| o.reason.map(|reason| reason.word().to_owned())))
+            .texts("sent_by", orders.iter().map(|o| o.sender.word().to_owned()))
     }
 
     /// `fills`: `order_id, filled_at, qty, price, fee, liquidity, fill_id`, and beyond the contract's columns why it was filled

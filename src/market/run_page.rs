@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use chrono::DateTime;
 
-use crate::report::quantity::{UNDEFINED, fine, number, with_unit};
+use crate::report::quantity::{UNDEFINED, fine, number, percent, with_unit};
 use crate::report::{BacktestPage, Cost, Exposure, Fall, Fill, InForce, Input, MonthReturn, Trade};
 use crate::sim2real::{Parameter, Simulator, Timestamp};
 
 use super::metric::{Drawdown, Metrics, Month, RoundTrip};
 use super::run_figures::{figure_groups, key_figures};
-use super::{Backtest, Calendar, DataSeen, EquityPoint, Record, Reference, RunSummary};
+use super::{Backtest, Calendar, DataSeen, EquityPoint, Rate, Record, Reference, Requirement, RunSummary};
 
 /// Fills a page is given: it lists no more.
 const FILLS: usize = 200;
@@ -65,13 +65,22 @@ fn exposures(backtest: &Backtest, record: &Record) -> Vec<Exposure> {
 }
 
 fn held(record: &Record, instrument: usize) -> Vec<f64> {
-    let mut fills = record.blotter.fills.iter().filter(|fill| fill.instrument == instrument).peekable();
+    let fills = record.blotter.fills.iter().enumerate();
+    let mut fills = fills.filter(|(_, fill)| fill.instrument == instrument).peekable();
+    let mut actions = record.account.actions.iter().filter(|booked| booked.action.instrument == instrument).peekable();
     let mut position = 0.0;
     let at = |point: &EquityPoint| {
-        while let Some(fill) = fills.next_if(|fill| fill.filled_at <= point.time) {
-            position += fill.quantity.signed(fill.side).to_f64();
+        loop {
+            let booked = actions.peek().filter(|booked| booked.action.at <= point.time).map_or(usize::MAX, |b| b.fills);
+            if let Some((_, fill)) = fills.next_if(|(k, fill)| *k < booked && fill.filled_at <= point.time) {
+                position += fill.quantity.signed(fill.side).to_f64();
+            } else if let Some(booked) = actions.next_if(|_| booked < usize::MAX) {
+                // After a split in new units.
+                position = booked.after.to_f64();
+            } else {
+                break position;
+            }
         }
-        position
     };
     record.equity.iter().map(at).collect()
 }
@@ -173,6 +182,48 @@ fn matched(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec<
     all
 }
 
+/// How the account was kept, where that was not cash in one currency.
+fn account_terms(backtest: &Backtest, summary: &RunSummary) -> Vec<(String, String)> {
+    let Some(account) = &backtest.settings().account else { return Vec::new() };
+    let mut all = Vec::new();
+    for (instrument, terms) in backtest.instruments().iter().zip(&account.terms) {
+        let mut told = Vec::new();
+        if terms.multiplier.get() != 1 {
+            told.push(format!("{} units in one", terms.multiplier.get()));
+        }
+        if terms.currency != 0 {
+            told.push(format!("in {}", account.currencies.get(terms.currency).map_or("", String::as_str)));
+        }
+        let margin = |what: &str, of: Requirement| {
+            format!("margin {what} {} to open, {} to keep", percent(of.initial.to_f64()), percent(of.maintenance.to_f64()))
+        };
+        for (what, of) in [("long", terms.long), ("short", terms.short)] {
+            if of != Requirement::default() {
+                told.push(margin(what, of));
+            }
+        }
+        if !told.is_empty() {
+            all.push((format!("terms of {}", instrument.symbol), told.join("; ")));
+        }
+    }
+    for (name, rate) in account.currencies.iter().skip(1).zip(&account.rates) {
+        let told = match rate {
+            Rate::Constant(rate) => format!("{} at all times; a trade in it is owed or held in it", rate.to_f64()),
+            Rate::Known(rates) => format!("{} known from their times on; a trade in it is owed or held in it", rates.len()),
+            Rate::PriceOf(k) => format!("the latest price of {}", symbol(backtest, *k)),
+        };
+        all.push((format!("rate of {name}"), told));
+    }
+    match summary.counts.corporate_actions {
+        0 => {}
+        count => all.push((
+            "dividends and splits".to_owned(),
+            format!("{count}; bars and quotes of before a split stay as they were printed"),
+        )),
+    }
+    all
+}
+
 fn in_force(summary: &RunSummary, backtest: &Backtest, record: &Record) -> Vec<InForce> {
     let venue = backtest.venue();
     let currency = &summary.provenance.currency;
@@ -203,6 +254,7 @@ fn in_force(summary: &RunSummary, backtest: &Backtest, record: &Record) -> Vec<I
     all.extend(matched(summary, backtest, &record.data).into_iter().map(|(name, setting)| assumption(name, setting)));
     all.extend(hours(backtest, record).into_iter().map(|(name, setting)| assumption(&name, setting)));
     all.push(assumption("largest leverage", format!("{} times the equity", number(backtest.settings().max_leverage))));
+    all.extend(account_terms(backtest, summary).into_iter().map(|(name, setting)| assumption(&name, setting)));
     all.push(assumption("market", "the past does not react to what the backtest trades".to_owned()));
     for file in &summary.data {
         all.extend(file.lines.iter().map(|line| assumption("data", format!("{}, {line}", file.symbol))));

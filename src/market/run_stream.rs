@@ -1,12 +1,11 @@
 //! Runs whose data are read while they go: `stream = true`.
 
-use crate::io::{DataEntry, FeedKind, InputError, RunFile, TableChunks, file_hash};
+use crate::io::{DataEntry, FeedKind, InputError, RunFile, TableChunks};
 use crate::sim2real::Timestamp;
 
 use super::line::Line;
 use super::run::{no_data, provenance, settings, span, venue};
-use super::run_calendar::ReadCalendars;
-use super::run_log::InputFile;
+use super::run_beside::Beside;
 use super::stream::{Between, Dated, Stream, StreamError};
 use super::{Backtest, BacktestError, FileStream, History, Instrument, PreparedRun, Session, Sources, run_needs};
 
@@ -21,21 +20,11 @@ pub fn prepare_streaming_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     let begun = begun.collect::<Result<Vec<History>, StreamError>>().map_err(|error| input(run, error))?;
     let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     run_needs::check(run, &venue, &instruments, &begun)?;
-    let mut calendars = ReadCalendars::default();
-    let settings = settings(run, &begun, &mut calendars)?;
-    let files = run
-        .data
-        .iter()
-        .map(|entry| Ok(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows: None }));
-    let data = files.collect::<Result<Vec<InputFile>, InputError>>()?;
-    let files = calendars.files.iter().cloned().chain(data).collect();
+    let beside = Beside::read(run)?;
+    let settings = settings(run, &begun, &beside)?;
     let backtest = Backtest::streaming(instruments, venue, settings).map_err(|error| super::explained(run, &error))?;
-    Ok(PreparedRun {
-        provenance: provenance(run, &backtest, files)?,
-        backtest,
-        streamed: Some(Box::new(run.clone())),
-        calendars,
-    })
+    let provenance = provenance(run, &backtest, beside.inputs(run, &[])?)?;
+    Ok(PreparedRun { provenance, backtest, streamed: Some(Box::new(run.clone())), beside })
 }
 
 impl PreparedRun {
@@ -65,7 +54,7 @@ fn input(run: &RunFile, error: StreamError) -> InputError {
 fn sources(run: &RunFile) -> Result<Vec<Sources>, InputError> {
     let of = |(index, symbol): (usize, &str)| {
         let mut sources = Sources::default();
-        let mut entries = run.data.iter().filter(|entry| entry.symbol == symbol).peekable();
+        let mut entries = run.data.iter().filter(|e| e.symbol == symbol && e.kind != FeedKind::Actions).peekable();
         if entries.peek().is_none() {
             return Err(no_data(run, index, symbol));
         }
@@ -85,6 +74,7 @@ fn add(sources: &mut Sources, run: &RunFile, entry: &DataEntry) -> Result<(), In
         FeedKind::Book if format.layout.tells_orders() => {
             sources.order_events = Some(cut(FileStream::order_events(path, format, rows)?, span));
         }
+        FeedKind::Actions => {}
         FeedKind::Book => sources.depth = Some(cut(FileStream::depth(path, format, rows)?, span)),
     }
     Ok(())

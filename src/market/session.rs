@@ -5,6 +5,7 @@ use std::fmt;
 
 use crate::sim2real::Timestamp;
 
+use super::account::{Keeping, amount};
 use super::agenda::{Agenda, Due, Phase};
 use super::backtest::{Backtest, BacktestError, Held, Record, Settings};
 use super::blotter::Blotter;
@@ -54,6 +55,8 @@ pub struct Session<'d> {
     pub(super) equity: EquityCurve,
     held: Held,
     rows: usize,
+    /// Terms, rates and corporate actions, where the account has any.
+    pub(super) keeping: Option<Box<Keeping>>,
 }
 
 impl fmt::Debug for Session<'_> {
@@ -77,7 +80,7 @@ fn detail(line: &Line<'_>) -> Detail {
 
 impl<'d> Session<'d> {
     pub(super) fn new(setup: &'d Backtest, feed: Feed<'d>) -> Self {
-        let Settings { cash, seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
+        let Settings { seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
         let origin = feed.peek().unwrap_or_default();
         let (intrabar, limit_fill, queue) = (matching.intrabar, matching.limit_fill, matching.queue);
@@ -110,13 +113,15 @@ impl<'d> Session<'d> {
         for (k, _) in timetable.each().iter().enumerate().filter(|(_, hours)| hours.is_some()) {
             venue.floors[k].auctions = Some(Auctions::of(feed.line(k)));
         }
+        let mut agenda = Agenda::default();
+        let (ledger, keeping) = Keeping::start(&setup.settings, count, origin, &mut agenda);
         Self {
             setup,
             equity: EquityCurve::new(equity_every, feed.rows()),
             feed,
             trades_mark,
             transit: Transit::new(count),
-            agenda: Agenda::default(),
+            agenda,
             direct: latencies.feed.is_none(),
             clocks: Clocks::new(latencies, seed),
             timetable,
@@ -130,7 +135,8 @@ impl<'d> Session<'d> {
             outcomes: Vec::new(),
             terms: Vec::new(),
             expected: vec![None; count],
-            ledger: Ledger::new(cash, count),
+            ledger,
+            keeping: keeping.map(Box::new),
             carry: Carry::new(count),
             orders: Orders::default(),
             held: Held::default(),
@@ -182,6 +188,7 @@ impl<'d> Session<'d> {
             equity: self.equity.clone(),
             held: self.held,
             rows: self.rows,
+            keeping: self.keeping.clone(),
         })
     }
 
@@ -200,7 +207,7 @@ impl<'d> Session<'d> {
                 (Some(next), None) | (None, Some(next)) => next,
                 (None, None) => return Ok(None),
             };
-            if self.agenda.peek().is_some_and(|due| due < (next, Phase::Data)) {
+            if self.agenda.peek().is_some_and(|due| due < (next, Phase::Data) && !self.a_bar_ends_first(due)) {
                 if let Some(event) = self.act(Some(strategy))? {
                     return Ok(Some(event));
                 }
@@ -231,6 +238,7 @@ impl<'d> Session<'d> {
     pub fn finish(mut self) -> Result<Record, BacktestError> {
         let end = self.equity.end().unwrap_or(Timestamp::MIN);
         let fills = self.blotter.fills.len();
+        let before = self.ledger.balances().to_vec();
         while self.agenda.peek().is_some_and(|(at, _)| at <= end) || !self.mail.is_empty() {
             let Some((at, due)) = self.agenda.pop() else { break };
             match due {
@@ -239,16 +247,16 @@ impl<'d> Session<'d> {
                 _ => {}
             }
         }
-        let cash = self.ledger.cash();
         self.charge_all(end)?;
-        if self.blotter.fills.len() > fills || self.ledger.cash() != cash {
-            let equity = self.ledger.equity().map_err(|error| BacktestError::Money { place: "the end".into(), error })?;
+        if self.blotter.fills.len() > fills || self.ledger.balances() != before {
+            let equity = self.ledger.equity().map_err(|error| self.amount("the end".into(), error))?;
             self.equity.push(end, equity.to_f64());
         }
         self.held.ambiguous_bars = self.venue.floors.iter().map(|floor| floor.ambiguous_bars()).sum();
         self.held.mean_equity = self.equity.mean();
         let data = self.feed.lines().iter().map(DataSeen::of).collect();
         let outside = self.timetable.outside();
+        let account = self.keeping.map(|keeping| keeping.record).unwrap_or_default();
         Ok(Record {
             blotter: self.blotter,
             equity: self.equity.finish(),
@@ -256,6 +264,7 @@ impl<'d> Session<'d> {
             held: self.held,
             data,
             outside,
+            account,
         })
     }
 
@@ -269,18 +278,12 @@ impl<'d> Session<'d> {
     /// What is due next happens: the event it makes for the strategy, if it asked to be woken.
     fn act(&mut self, strategy: Option<&mut dyn Strategy>) -> Result<Option<Event>, BacktestError> {
         let Some((at, due)) = self.agenda.pop() else { return Ok(None) };
+        if self.keeping.is_some() {
+            self.look_up_rates(at);
+        }
         match due {
-            Due::Notice(place) => {
-                let notice = self.note(place)?;
-                if let (Some(notice), Some(strategy)) = (notice, strategy) {
-                    let event = Event { time: at, instrument: notice.instrument, kind: EventKind::Timer };
-                    let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
-                    let (view, orders) = self.view(event, equity);
-                    strategy.on_notice(&view, &notice, orders);
-                    self.send_asked(at, equity);
-                }
-                Ok(None)
-            }
+            Due::Notice(place) => self.deliver(place, at, strategy).map(|()| None),
+            Due::Action(number) => self.take_action(number, at, strategy).map(|()| None),
             Due::Wake => {
                 let event = Event { time: at, instrument: 0, kind: EventKind::Timer };
                 match strategy {
@@ -290,6 +293,30 @@ impl<'d> Session<'d> {
             }
             due => self.at_venue(at, due).map(|()| None),
         }
+    }
+
+    /// The strategy learns what became of an order.
+    pub(super) fn deliver(
+        &mut self,
+        place: usize,
+        at: Timestamp,
+        strategy: Option<&mut dyn Strategy>,
+    ) -> Result<(), BacktestError> {
+        let notice = self.note(place)?;
+        if let (Some(notice), Some(strategy)) = (notice, strategy) {
+            let event = Event { time: at, instrument: notice.instrument, kind: EventKind::Timer };
+            self.tell(event, |view, orders| strategy.on_notice(view, &notice, orders))?;
+        }
+        Ok(())
+    }
+
+    /// The strategy is told something that is no event, and may ask for orders.
+    pub(super) fn tell(&mut self, event: Event, hears: impl FnOnce(&View<'_>, &mut Orders)) -> Result<(), BacktestError> {
+        let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
+        let (view, orders) = self.view(event, equity);
+        hears(&view, orders);
+        self.send_asked(event.time, equity);
+        Ok(())
     }
 
     /// Something happens at the exchange: orders that wait there meet it.
@@ -373,6 +400,9 @@ impl<'d> Session<'d> {
         let event = arrival.event;
         self.carry_over(event.time)?;
         self.learn(arrival, strategy.lookback().max(1)).map_err(|error| self.money(event, error))?;
+        if self.keeping.is_some() {
+            self.keep_account(arrival)?;
+        }
         self.decide(event, strategy)
     }
 
@@ -457,8 +487,27 @@ impl<'d> Session<'d> {
         self.equity.push(time, equity);
     }
 
-    fn money(&self, event: Event, error: MoneyError) -> BacktestError {
+    pub(super) fn money(&self, event: Event, error: MoneyError) -> BacktestError {
         let symbol = &self.setup.instruments[event.instrument].symbol;
-        BacktestError::Money { place: format!("{symbol} at {}", event.time), error }
+        self.amount(format!("{symbol} at {}", event.time), error)
+    }
+
+    fn amount(&self, place: String, error: MoneyError) -> BacktestError {
+        amount(place, error, self.setup.settings.account.as_deref())
+    }
+
+    /// Whether a bar ends at the instant of the action that is due next, and has not been seen yet.
+    #[cold]
+    fn a_bar_of_that_instant_ends(&self, at: Timestamp) -> bool {
+        let (Some(Due::Action(number)), Some(keeping)) = (self.agenda.next_due(), &self.keeping) else { return false };
+        let instrument = keeping.account.actions[number].instrument;
+        let row = self.feed.next_bar(instrument);
+        row.and_then(|row| self.feed.line(instrument).bar(row)).is_some_and(|bar| bar.known_at == at)
+    }
+
+    /// Whether what is due has to wait for a bar that ends at its instant, which is of the time before an action.
+    #[inline(always)]
+    fn a_bar_ends_first(&self, (at, phase): (Timestamp, Phase)) -> bool {
+        phase == Phase::Acts && self.a_bar_of_that_instant_ends(at)
     }
 }

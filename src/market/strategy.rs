@@ -4,9 +4,11 @@ use crate::sim2real::Timestamp;
 
 use super::hours::TradingHours;
 use super::known::Known;
+use super::rates::multiplied;
 use super::{
-    Bar, Bracket, Calendar, Cash, Condition, DepthBook, Hours, Increments, Instrument, Ledger, Link, OpenOrder, OrderId,
-    OrderKind, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Ticket,
+    Balance, Bar, Bracket, Calendar, Cash, Condition, CorporateAction, DepthBook, Hours, Increments, Instrument, Ledger,
+    Link, Margin, OpenOrder, OrderId, OrderKind, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Terms,
+    Ticket,
 };
 
 /// What brought an event about; in the order in which they come at one instant.
@@ -183,26 +185,56 @@ impl<'a> View<'a> {
         self.known.get(instrument).map_or(Quantity::ZERO, |known| known.working)
     }
 
-    /// Cash in hand.
+    /// Cash in hand, in the currency of the run.
     #[must_use]
     pub fn cash(&self) -> Cash {
         self.ledger.cash()
     }
 
-    /// Cash and what all positions are worth.
+    /// What there is in each currency, first in that of the run.
+    #[must_use]
+    pub fn balances(&self) -> &'a [Balance] {
+        self.ledger.balances()
+    }
+
+    /// The terms an instrument is held on: its currency, multiplier and margin.
+    #[must_use]
+    pub fn terms(&self, instrument: usize) -> Terms {
+        self.ledger.terms().get(instrument).copied().unwrap_or_default()
+    }
+
+    /// Equity beside what the positions require; none where they have no margin that could be told: a currency has no rate yet.
+    #[must_use]
+    pub fn margin(&self) -> Option<Margin> {
+        self.ledger.margin().ok()
+    }
+
+    /// What one unit of an instrument is worth at its latest price, with its multiplier [currency of the run]; none where there
+    /// is no price, or no rate yet.
+    #[must_use]
+    pub fn unit_value(&self, instrument: usize) -> Option<f64> {
+        let (price, terms) = (self.price(instrument)?, self.terms(instrument));
+        let rate = match terms.currency {
+            0 => 1.0,
+            other => self.ledger.balances().get(other)?.rate?.to_f64(),
+        };
+        Some(price.to_f64() * multiplied(rate, terms.multiplier))
+    }
+
+    /// Cash and what all positions are worth, in the currency of the run.
     #[must_use]
     pub fn equity(&self) -> Cash {
         self.equity
     }
 
-    /// The whole lots of an instrument that `amount` [currency] is worth at its latest price; 0 where there is no price
-    /// or the amount is not above 0.
+    /// The whole lots of an instrument that `amount` [currency of the run] is worth at its latest price; 0 where there is no
+    /// price or no rate, or the amount is not above 0.
     #[must_use]
     pub fn lots_worth(&self, instrument: usize, amount: f64) -> Quantity {
-        let (Some(price), Some(steps)) = (self.price(instrument), self.increments.get(instrument)) else {
+        let (Some(value), Some(steps)) = (self.unit_value(instrument), self.increments.get(instrument)) else {
             return Quantity::ZERO;
         };
-        let units = amount / price.to_f64();
+        let units = amount / value;
         if units > 0.0 { Quantity::nearest(units).map_or(Quantity::ZERO, |q| steps.whole_lots(q)) } else { Quantity::ZERO }
     }
 }
@@ -218,10 +250,15 @@ pub struct Orders {
 impl Orders {
     /// Asks for an order, and gives its id.
     pub fn submit(&mut self, ticket: Ticket) -> OrderId {
-        self.asked += 1;
-        let id = OrderId(self.asked);
+        let id = self.number();
         self.requests.push(Request::Submit(id, ticket));
         id
+    }
+
+    /// The number of an order that somebody else sends.
+    pub(super) fn number(&mut self) -> OrderId {
+        self.asked += 1;
+        OrderId(self.asked)
     }
 
     /// Asks for a market order.
@@ -347,6 +384,9 @@ pub trait Strategy: Send {
     fn on_event(&mut self, view: &View<'_>, orders: &mut Orders);
     /// Learns what became of one of its orders, and may ask for more.
     fn on_notice(&mut self, _view: &View<'_>, _notice: &Notice, _orders: &mut Orders) {}
+    /// Learns of a dividend or a split of an instrument, and may ask for orders. The account has booked it, and what works
+    /// of its own orders is told in the new units; bars and quotes of before are not: they stay as they were printed.
+    fn on_action(&mut self, _view: &View<'_>, _action: &CorporateAction, _orders: &mut Orders) {}
     /// The same with all it remembers, for a run that is forked; none where it cannot be copied: such a run is repeated.
     fn copied(&self) -> Option<Box<dyn Strategy>> {
         None

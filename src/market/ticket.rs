@@ -2,7 +2,8 @@
 
 use crate::sim2real::Timestamp;
 
-use super::{Price, Quantity, Side};
+use super::account::Ratio;
+use super::{Increments, Price, Quantity, Side};
 
 /// The number of an order within its run, from 1 in the order in which they were asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -106,6 +107,20 @@ impl OrderKind {
             _ => None,
         };
         [self.limit(), self.trigger(), distance].into_iter().flatten()
+    }
+
+    /// The same with every price as it is after a split, where all are on a tick then.
+    pub(super) fn split(self, ratio: Ratio, increments: Increments) -> Option<Self> {
+        let of = |price| ratio.price_on_tick(price, increments);
+        Some(match self {
+            Self::Limit { price } => Self::Limit { price: of(price)? },
+            Self::Stop { trigger } => Self::Stop { trigger: of(trigger)? },
+            Self::StopLimit { trigger, price } => Self::StopLimit { trigger: of(trigger)?, price: of(price)? },
+            Self::TrailingStop { distance } => Self::TrailingStop { distance: of(distance)? },
+            Self::LimitOnOpen { price } => Self::LimitOnOpen { price: of(price)? },
+            Self::LimitOnClose { price } => Self::LimitOnClose { price: of(price)? },
+            Self::Market | Self::MarketOnOpen | Self::MarketOnClose => self,
+        })
     }
 
     /// The same with the limit moved to `price`; unchanged where it has none.

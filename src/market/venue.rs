@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
 
-use super::{AnotherFill, Book, DepthBook, Execution, Increments, Quantity, Side};
+use super::{AnotherFill, Book, ChargeKind, DepthBook, Execution, Increments, Quantity, Side};
 
 pub use path::Intrabar;
 pub use queue::QueueModel;
@@ -103,8 +103,8 @@ pub(super) struct Venue {
     pub floors: Vec<Floor>,
     /// Ids of the mechanisms that act on prices, in their order.
     pub conceding: Vec<&'static str>,
-    /// Whether anything is charged, on fills or on what is held.
-    pub charges: bool,
+    /// What each mechanism that may charge, on fills or on what is held, charges for.
+    pub charges: Vec<ChargeKind>,
 }
 
 /// What a venue is made of beside its mechanisms.
@@ -140,7 +140,8 @@ impl Venue {
         let averages = assembly.modelled().contains(&"book_walk");
         let at_plant = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Plant);
         let conceding: Vec<&'static str> = at_plant.map(|about| about.name).collect();
-        let charges = assembly.mechanisms().any(|(row, ..)| row.about().site == Site::Observation);
+        let reporting = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Observation);
+        let charges = reporting.map(|about| charge_kind(about.name)).collect();
         let floor = |(number, symbol): (usize, &&str)| {
             let run = assembly.run(&thetas, &still, setup.seed.child(symbol));
             let increments = setup.increments[number];
@@ -157,6 +158,15 @@ impl Venue {
         };
         let floors = setup.symbols.iter().enumerate().map(floor).collect();
         Self { floors, conceding, charges }
+    }
+}
+
+/// What a mechanism charges for.
+fn charge_kind(mechanism: &str) -> ChargeKind {
+    match mechanism {
+        "borrow_fee" => ChargeKind::Borrow,
+        "funding" => ChargeKind::Funding,
+        _ => ChargeKind::Other,
     }
 }
 

@@ -119,9 +119,16 @@ impl<P: Plant> Run<P> {
 
     /// What is reported of every lane at `time` [s].
     pub fn observe(&mut self, time: f64) -> &[P::Observation] {
+        self.observe_seen(time, |_, _| {})
+    }
+
+    /// As [`observe`](Self::observe), and shows `seen` the observations after each law of them, with the law's number among
+    /// these.
+    pub fn observe_seen(&mut self, time: f64, mut seen: impl FnMut(usize, &[P::Observation])) -> &[P::Observation] {
         self.dynamics.observe(&self.states, &mut self.observations);
-        for law in &mut self.observation_laws {
+        for (k, law) in self.observation_laws.iter_mut().enumerate() {
             law.sense(time, &mut self.observations);
+            seen(k, &self.observations);
         }
         &self.observations
     }

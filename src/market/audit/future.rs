@@ -1,5 +1,7 @@
 //! Other futures: the same past, and something else after it.
 
+use std::sync::Arc;
+
 use rand::RngExt;
 use serde::Serialize;
 
@@ -47,7 +49,10 @@ pub(in crate::market) fn with_future(
         Change::CutOff => cut_off(history, now),
         Change::Changed => changed(history, now, seed, number),
     };
-    backtest.on(backtest.histories().iter().enumerate().map(of).collect())
+    let mut other = backtest.on(backtest.histories().iter().enumerate().map(of).collect())?;
+    // Dividends, splits and rates of later never come.
+    other.settings.account = other.settings.account.map(|account| Arc::new(account.until(now)));
+    Ok(other)
 }
 
 fn cut_off(history: &History, now: Timestamp) -> History {

@@ -62,6 +62,18 @@ impl Ledger {
         Ok(Margin { equity: self.equity()?, required_initial, required_maintenance })
     }
 
+    /// The initial margin that `quantity` of an instrument, negative when short, requires at its mark, in the base currency; none
+    /// where there is no such instrument.
+    ///
+    /// # Errors
+    /// If its currency has no rate, or 128 bits do not hold it.
+    pub fn initial_margin_of(&self, instrument: usize, quantity: Quantity) -> Result<Cash, MoneyError> {
+        let (Some(position), Some(terms)) = (self.positions.get(instrument), self.terms.get(instrument)) else {
+            return Ok(Cash::ZERO);
+        };
+        self.required(position, quantity, requirement(terms, quantity).initial)
+    }
+
     /// What to close so that equity is no longer below maintenance, at the present marks and without costs; nothing where it
     /// is not. Where equity is below 0, no closing mends that, and all is closed.
     ///

@@ -5,8 +5,8 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas
 
 /// A commission on each order filled, in the form of the broker's schedule; negative for a rebate.
 ///
-/// - `bps`: `fee += bps * 1e-4 * price * quantity`;
-/// - `per_share`: `fee += per_share * quantity`;
+/// - `bps`: `fee += bps * 1e-4 * price * quantity * multiplier`;
+/// - `per_share`: `fee += per_share * quantity`, which of a future is by contract;
 /// - `minimum`: the same, and at least `minimum` an order;
 /// - `capped`: the same, and at most `maximum_bps` of the notional, which goes before the minimum, as US brokers have it;
 /// - `per_order`: `fee += per_order`, however much is filled;
@@ -107,7 +107,7 @@ impl Schedule {
         let shares = self.per_share * report.quantity;
         let shares = self.minimum.map_or(shares, |minimum| shares.max(minimum));
         let most = 1e-4 * self.maximum_bps * report.notional();
-        bps * report.quantity * (1e-4 * report.price) + shares.min(most) + self.per_order
+        bps * report.quantity * report.multiplier * (1e-4 * report.price) + shares.min(most) + self.per_order
     }
 }
 

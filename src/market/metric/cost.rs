@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::market::Blotter;
+use crate::market::Record;
 
 use super::defined;
 
-/// What all fills cost against the prices at which they were decided: a positive number is a loss. The parts add up to
+/// What all fills cost, in the currency of the run at the rates of the fills, against the prices at which they were decided: a positive number is a loss. The parts add up to
 /// the implementation shortfall of what was filled; what was not filled is in the counts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Costs {
@@ -32,18 +32,17 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// The costs of all fills of `blotter`.
+    /// The costs of all fills of `record`.
     #[must_use]
-    pub fn of(blotter: &Blotter) -> Self {
+    pub fn of(record: &Record) -> Self {
+        let blotter = &record.blotter;
         let mut costs = Self::default();
         for fill in &blotter.fills {
-            costs.timing += fill.cost.timing;
-            costs.spread_and_impact += fill.cost.spread_and_impact;
-            costs.rounding += fill.cost.rounding;
-            costs.fees += fill.fee.to_f64();
-            if let Some(order) = blotter.order(fill.order_id) {
-                costs.decided_value += (order.decision_price * fill.quantity).to_f64();
-            }
+            costs.timing += fill.cost.timing * fill.rate;
+            costs.spread_and_impact += fill.cost.spread_and_impact * fill.rate;
+            costs.rounding += fill.cost.rounding * fill.rate;
+            costs.fees += fill.fee.to_f64() * fill.rate;
+            costs.decided_value += (fill.decision_price * fill.quantity).to_f64() * record.worth_of_one(fill);
         }
         costs.mechanisms.clone_from(&blotter.concessions);
         costs.shortfall = costs.timing + costs.spread_and_impact + costs.rounding + costs.fees;

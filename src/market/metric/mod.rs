@@ -1,6 +1,7 @@
 //! What a backtest came to, in figures. A figure that is not defined for a run is none, never NaN or infinity.
 
 mod cost;
+mod currency;
 mod daily_return;
 mod drawdown;
 mod moment;
@@ -13,10 +14,11 @@ mod trading;
 
 use serde::Serialize;
 
-use super::{Fill, Held, Instrument, MoneyError, Record, Status};
+use super::{Fill, Held, Income, Instrument, MoneyError, Position, Price, Record, Sender, Status};
 use daily_return::{DailyReturns, closes, years};
 
 pub use cost::Costs;
+pub use currency::{ChargeSummary, CurrencySummary};
 pub use drawdown::{Drawdown, Drawdowns};
 pub use month::Month;
 pub use returns::Returns;
@@ -70,6 +72,10 @@ pub struct Metrics {
     pub unrealised: f64,
     /// What was charged for holding, such as borrow fees and funding; negative where it paid [currency].
     pub charges: f64,
+    /// Dividends received before tax, less those paid on short positions [currency].
+    pub dividends: f64,
+    /// Tax withheld from them [currency].
+    pub withheld: f64,
     /// What trading cost.
     pub costs: Costs,
 }
@@ -98,6 +104,12 @@ pub struct Counts {
     pub ambiguous_bars: usize,
     /// Fills.
     pub fills: usize,
+    /// Orders the broker sent to close what the account could not carry; they are among the orders.
+    pub broker_orders: usize,
+    /// How often equity fell below maintenance margin.
+    pub margin_calls: usize,
+    /// Dividends and splits.
+    pub corporate_actions: usize,
     /// Orders refused before they were sent, by reason.
     pub rejected: std::collections::BTreeMap<super::Reason, usize>,
 }
@@ -118,6 +130,9 @@ impl Counts {
             resting: blotter.orders.iter().filter(|order| order.kind != super::OrderKind::Market).count(),
             ambiguous_bars: record.held.ambiguous_bars,
             fills: blotter.fills.len(),
+            broker_orders: blotter.orders.iter().filter(|order| order.sender == Sender::Broker).count(),
+            margin_calls: record.account.margin_calls.len(),
+            corporate_actions: record.account.actions.len(),
             rejected: blotter.rejected.clone(),
         }
     }
@@ -137,12 +152,14 @@ impl Metrics {
             _ => 0.0,
         };
         let growth = if initial > 0.0 { defined(last / initial) } else { None };
-        let traded: f64 = record.blotter.fills.iter().map(|fill| (fill.price * fill.quantity).to_f64()).sum();
+        let traded: f64 = record.blotter.fills.iter().map(|fill| value(record, fill)).sum();
         let (mut realised, mut unrealised) = (0.0, 0.0);
         for position in record.ledger.positions() {
-            realised += position.realised.to_f64();
-            unrealised += position.value().minus(position.basis)?.to_f64();
+            let rate = record.rate_of(position.currency);
+            realised += position.realised.to_f64() * rate;
+            unrealised += position.value().minus(position.basis)?.to_f64() * rate;
         }
+        let (dividends, withheld) = dividends(record);
         let Held { events, invested, leverage, .. } = record.held;
         let per_event = |sum: f64| if events > 0 { Some(sum / events as f64) } else { None };
         let days = closes(points);
@@ -173,7 +190,9 @@ impl Metrics {
             realised,
             unrealised,
             charges: charges(record)?,
-            costs: Costs::of(&record.blotter),
+            dividends,
+            withheld,
+            costs: Costs::of(record),
         })
     }
 }
@@ -186,7 +205,46 @@ fn hit_rate(fills: &[Fill]) -> Option<f64> {
 
 /// What was charged for holding [currency].
 fn charges(record: &Record) -> Result<f64, MoneyError> {
-    record.ledger.income().iter().try_fold(0.0, |sum, income| Ok(sum + income.charges.total()?.to_f64()))
+    let all = record.ledger.income().iter().zip(record.ledger.positions());
+    let one = |(income, position): (&Income, &Position)| -> Result<f64, MoneyError> {
+        Ok(income.charges.total()?.to_f64() * record.rate_of(position.currency))
+    };
+    let held = all.map(one).try_fold(0.0, |sum, charge| Ok::<_, MoneyError>(sum + charge?))?;
+    let on_cash = record.ledger.balances().iter().enumerate();
+    on_cash
+        .map(|(k, balance)| Ok(balance.charges.total()?.to_f64() * record.rate_of(k)))
+        .try_fold(held, |sum, charge| Ok(sum + charge?))
+}
+
+/// Dividends before tax and tax withheld [currency].
+fn dividends(record: &Record) -> (f64, f64) {
+    let all = record.ledger.income().iter().zip(record.ledger.positions());
+    all.fold((0.0, 0.0), |(dividends, withheld), (income, position)| {
+        let rate = record.rate_of(position.currency);
+        (dividends + income.dividends.to_f64() * rate, withheld + income.withheld.to_f64() * rate)
+    })
+}
+
+/// What a fill was worth at its rate [currency].
+fn value(record: &Record, fill: &Fill) -> f64 {
+    (fill.price * fill.quantity).to_f64() * record.worth_of_one(fill)
+}
+
+impl Record {
+    /// What one unit of a currency is worth at the end [currency of the run]; 0 where it has no rate.
+    #[must_use]
+    pub fn rate_of(&self, currency: usize) -> f64 {
+        match self.ledger.balances().get(currency) {
+            Some(balance) if currency > 0 => balance.rate.map_or(0.0, Price::to_f64),
+            _ => 1.0,
+        }
+    }
+
+    /// What one unit at a price of 1 was worth when `fill` was made [currency of the run].
+    fn worth_of_one(&self, fill: &Fill) -> f64 {
+        let terms = self.ledger.terms().get(fill.instrument).copied().unwrap_or_default();
+        fill.rate * terms.multiplier.get() as f64
+    }
 }
 
 /// The number, where it is one.
@@ -194,11 +252,14 @@ fn defined(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// What one instrument came to.
+/// What one instrument came to; amounts are in its own currency.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InstrumentSummary {
     /// Symbol.
     pub symbol: String,
+    /// Its currency, where the run has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub currency: Option<String>,
     /// Held at the end [units], negative when short.
     pub position: f64,
     /// Gain on what was closed, before fees [currency].
@@ -207,6 +268,12 @@ pub struct InstrumentSummary {
     pub unrealised: f64,
     /// Fees [currency].
     pub fees: f64,
+    /// Dividends before tax, less those paid when short [currency].
+    pub dividends: f64,
+    /// Tax withheld from them [currency].
+    pub withheld: f64,
+    /// Charged for holding [currency].
+    pub charges: f64,
     /// Number of fills.
     pub fills: usize,
     /// Rows from outside the sessions of its calendar, which no order met; none where it has no calendar.
@@ -217,19 +284,28 @@ pub struct InstrumentSummary {
 impl InstrumentSummary {
     /// One summary an instrument.
     #[must_use]
-    pub fn of(record: &Record, instruments: &[Instrument]) -> Vec<Self> {
-        let positions = record.ledger.positions().iter().zip(instruments).enumerate();
-        positions
-            .map(|(k, (position, instrument))| Self {
+    ///
+    /// # Errors
+    /// If an amount of cash is beyond what can be held.
+    pub fn of(record: &Record, instruments: &[Instrument]) -> Result<Vec<Self>, MoneyError> {
+        let ledger = &record.ledger;
+        let held = ledger.positions().iter().zip(ledger.income()).zip(instruments).enumerate();
+        held.map(|(k, ((position, income), instrument))| {
+            Ok(Self {
                 symbol: instrument.symbol.clone(),
+                currency: record.account.currencies.get(position.currency).cloned(),
                 position: position.quantity.to_f64(),
                 realised: position.realised.to_f64(),
                 unrealised: position.value().to_f64() - position.basis.to_f64(),
                 fees: position.fees.to_f64(),
+                dividends: income.dividends.to_f64(),
+                withheld: income.withheld.to_f64(),
+                charges: income.charges.total()?.to_f64(),
                 fills: record.blotter.fills.iter().filter(|fill| fill.instrument == k).count(),
                 rows_outside_sessions: record.outside.get(k).copied().flatten(),
             })
-            .collect()
+        })
+        .collect()
     }
 }
 

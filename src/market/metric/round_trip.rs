@@ -1,12 +1,14 @@
 //! Round trips: from flat to flat.
 
-use crate::market::{Cash, Fill, MoneyError, Position, Record, Side};
+use crate::market::{ActionKind, BookedAction, Cash, Fill, MoneyError, Multiplier, Position, Quantity, Record, Side};
 use crate::sim2real::Timestamp;
 
 /// A position from the fill that opened it to the fill that closed it or turned it round. What is added to it and what is
 /// taken off on the way belongs to the same trip, at average cost, as in the ledger: the gains of all trips add up to what
-/// the account gained, to the last unit. A fill that turns a position round ends one trip and begins the next, its fee
-/// divided by quantity.
+/// the account gained, to the last unit, dividends and charges left aside. A fill that turns a position round ends one trip and
+/// begins the next, its fee divided by quantity. After a split a trip goes on in new units, as if it had been entered in
+/// them; what is paid for fractions leaves it. Prices are per unit, and amounts have the multiplier in them, both in the
+/// instrument's currency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RoundTrip {
     /// Number of the instrument.
@@ -33,6 +35,9 @@ pub struct RoundTrip {
     pub fees: Cash,
     /// Gain after fees.
     pub net: Cash,
+    /// What one unit of the instrument's currency was worth at the last fill, or at the end where something is still held
+    /// [currency of the run].
+    pub rate: f64,
     /// Number of fills; one that turned the position round counts in both trips.
     pub fills: usize,
 }
@@ -46,7 +51,11 @@ impl RoundTrip {
         let positions = record.ledger.positions();
         let mut trips: Vec<Trip> = Vec::new();
         let mut under_way: Vec<Option<usize>> = vec![None; positions.len()];
-        for fill in &record.blotter.fills {
+        let mut actions = record.account.actions.iter().peekable();
+        for (number, fill) in record.blotter.fills.iter().enumerate() {
+            while let Some(action) = actions.next_if(|action| action.fills <= number) {
+                split(action, &mut trips, &mut under_way)?;
+            }
             let Some(current) = under_way.get_mut(fill.instrument) else { continue };
             let held = current.and_then(|k| trips.get(k)).map_or(0, Trip::held);
             let against = current.and_then(|k| trips.get_mut(k)).filter(|trip| trip.side != fill.side);
@@ -61,15 +70,22 @@ impl RoundTrip {
             if closing < fill.quantity.0 {
                 let k = *current.get_or_insert(trips.len());
                 if k == trips.len() {
-                    trips.push(Trip::entered_by(fill));
+                    let multiplier = positions.get(fill.instrument).map_or(Multiplier::default(), |p| p.multiplier);
+                    trips.push(Trip::entered_by(fill, multiplier));
                 }
                 if let Some(trip) = trips.get_mut(k) {
                     trip.enter(fill, fill.quantity.0 - closing, fill.fee.minus(closing_fee)?)?;
                 }
             }
         }
+        actions.try_for_each(|action| split(action, &mut trips, &mut under_way))?;
         let end = record.equity.last().map(|point| point.time);
-        trips.iter().filter_map(|trip| positions.get(trip.instrument).map(|p| trip.closed(p, end))).collect()
+        let closed = |trip: &Trip| -> Option<Result<Self, MoneyError>> {
+            let position = positions.get(trip.instrument)?;
+            let rate = if trip.held() == 0 { trip.rate } else { record.rate_of(position.currency) };
+            Some(trip.closed(position, end).map(|closed| Self { rate, ..closed }))
+        };
+        trips.iter().filter_map(closed).collect()
     }
 
     /// `long` or `short`.
@@ -86,6 +102,23 @@ impl RoundTrip {
     pub fn growth(&self) -> Option<f64> {
         super::defined(self.net.to_f64() / self.entry_value.to_f64())
     }
+}
+
+/// Tells the trip under way in the instrument of a split in new units.
+fn split(action: &BookedAction, trips: &mut [Trip], under_way: &mut [Option<usize>]) -> Result<(), MoneyError> {
+    let ActionKind::Split { new, old } = action.action.kind else { return Ok(()) };
+    let Some(current) = under_way.get_mut(action.action.instrument) else { return Ok(()) };
+    let Some(trip) = current.and_then(|k| trips.get_mut(k)) else { return Ok(()) };
+    trip.entered = trip.entered * i128::from(new) / i128::from(old);
+    // The rest has left, for cash.
+    trip.exited = trip.entered - i128::from(action.after.abs().0);
+    let paid = if trip.side == Side::Buy { action.received } else { Cash::ZERO.minus(action.received)? };
+    trip.exit_value = trip.exit_value.plus(paid)?;
+    if action.after == Quantity::ZERO {
+        trip.last_at = action.action.at;
+        *current = None;
+    }
+    Ok(())
 }
 
 /// `part` of `whole` of a fee, rounded towards 0 to 1e-18 of the currency.
@@ -106,11 +139,16 @@ struct Trip {
     exit_value: Cash,
     fees: Cash,
     fills: usize,
+    multiplier: Multiplier,
+    /// Of its last fill.
+    rate: f64,
 }
 
 impl Trip {
-    fn entered_by(fill: &Fill) -> Self {
+    fn entered_by(fill: &Fill, multiplier: Multiplier) -> Self {
         Self {
+            multiplier,
+            rate: fill.rate,
             instrument: fill.instrument,
             side: fill.side,
             entered_at: fill.filled_at,
@@ -131,19 +169,23 @@ impl Trip {
 
     fn enter(&mut self, fill: &Fill, quantity: i64, fee: Cash) -> Result<(), MoneyError> {
         self.entered += i128::from(quantity);
-        self.entry_value = self.entry_value.plus(value(fill, quantity))?;
+        self.entry_value = self.entry_value.plus(self.value(fill, quantity)?)?;
         self.count(fill, fee)
     }
 
     fn exit(&mut self, fill: &Fill, quantity: i64, fee: Cash) -> Result<(), MoneyError> {
         self.exited += i128::from(quantity);
-        self.exit_value = self.exit_value.plus(value(fill, quantity))?;
+        self.exit_value = self.exit_value.plus(self.value(fill, quantity)?)?;
         self.count(fill, fee)
+    }
+
+    fn value(&self, fill: &Fill, quantity: i64) -> Result<Cash, MoneyError> {
+        worth(fill.price * Quantity(quantity), self.multiplier)
     }
 
     fn count(&mut self, fill: &Fill, fee: Cash) -> Result<(), MoneyError> {
         self.fees = self.fees.plus(fee)?;
-        self.last_at = fill.filled_at;
+        (self.last_at, self.rate) = (fill.filled_at, fill.rate);
         self.fills += 1;
         Ok(())
     }
@@ -151,14 +193,16 @@ impl Trip {
     /// The trip as it ended, or as it stands at `end` with the mark of its `position`.
     fn closed(&self, position: &Position, end: Option<Timestamp>) -> Result<RoundTrip, MoneyError> {
         let held = self.held();
-        let worth = self.exit_value.plus(position.mark.unwrap_or_default() * crate::market::Quantity(held))?;
+        let still = worth(position.mark.unwrap_or_default() * Quantity(held), self.multiplier)?;
+        let left = self.exit_value.plus(still)?;
         let gross = match self.side {
-            Side::Buy => worth.minus(self.entry_value)?,
-            Side::Sell => self.entry_value.minus(worth)?,
+            Side::Buy => left.minus(self.entry_value)?,
+            Side::Sell => self.entry_value.minus(left)?,
         };
         let exited_at = (held == 0).then_some(self.last_at);
         // Units of cash over units of quantity are units of price.
-        let average = |value: Cash, quantity: i128| value.0 as f64 / quantity as f64 / 1e9;
+        let units = self.multiplier.get() as f64;
+        let average = |value: Cash, quantity: i128| value.0 as f64 / quantity as f64 / 1e9 / units;
         Ok(RoundTrip {
             instrument: self.instrument,
             side: self.side,
@@ -172,11 +216,13 @@ impl Trip {
             gross,
             fees: self.fees,
             net: gross.minus(self.fees)?,
+            rate: self.rate,
             fills: self.fills,
         })
     }
 }
 
-fn value(fill: &Fill, quantity: i64) -> Cash {
-    fill.price * crate::market::Quantity(quantity)
+/// `amount` so many times.
+fn worth(amount: Cash, multiplier: Multiplier) -> Result<Cash, MoneyError> {
+    amount.0.checked_mul(multiplier.get().into()).map(Cash).ok_or(MoneyError::Overflow)
 }

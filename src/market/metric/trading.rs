@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{RoundTrip, defined};
 use crate::market::Side;
 
-/// Figures of the round trips that were closed, after fees; a trip that gained nothing is neither won nor lost.
+/// Figures of the round trips that were closed, after fees, in the currency of the run at the rates of their ends; a trip that gained nothing is neither won nor lost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Trading {
     /// Trips closed.
@@ -41,7 +41,7 @@ impl Trading {
     #[must_use]
     pub fn of(trips: &[RoundTrip]) -> Self {
         let closed: Vec<&RoundTrip> = trips.iter().filter(|trip| trip.exited_at.is_some()).collect();
-        let net: Vec<f64> = closed.iter().map(|trip| trip.net.to_f64()).collect();
+        let net: Vec<f64> = closed.iter().map(|trip| trip.net.to_f64() * trip.rate).collect();
         let wins: Vec<f64> = net.iter().copied().filter(|gain| *gain > 0.0).collect();
         let losses: Vec<f64> = net.iter().copied().filter(|gain| *gain < 0.0).collect();
         let growths: Vec<f64> = closed.iter().filter_map(|trip| trip.growth()).collect();

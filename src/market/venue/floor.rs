@@ -1,5 +1,6 @@
 //! The floor on which one instrument is traded: the orders that wait there, and what fills them.
 
+use crate::market::account::Ratio;
 use crate::market::{
     AnotherFill, Book, Condition, Execution, InFlight, Increments, Link, Met, OrderId, Price, Quantity, Reason, Reference,
     Role, Side,
@@ -121,12 +122,13 @@ impl Floor {
         self.run.send(tick, order).first().copied().unwrap_or(*order)
     }
 
-    /// What a position that is held is charged, from when it was charged last to `now` [currency].
-    pub fn charge(&mut self, held: &InFlight, mid: f64, now: Timestamp) -> f64 {
+    /// Shows `seen` what a position that is held is charged, from when it was charged last to `now`, by each law of reports and
+    /// those before it together [currency].
+    pub fn charge(&mut self, held: &InFlight, mid: f64, now: Timestamp, mut seen: impl FnMut(usize, f64)) {
         let tick = self.tick(now);
         self.run.deliver(&[held.as_a(Role::Holder).arriving(now)]);
         self.run.advance(tick, |_| Met { book: Book::at_price(now, mid), reference: mid, volume: f64::INFINITY });
-        self.run.observe(tick.time).first().map_or(0.0, |report| report.fee)
+        self.run.observe_seen(tick.time, |law, reports| seen(law, reports.first().map_or(0.0, |report| report.fee)));
     }
 
     /// How much of order `k` may be filled now: a reduce-only order no more than closes what is held.
@@ -188,7 +190,7 @@ impl Floor {
         let offer = Offer { reference: limit.to_f64(), ..*offer };
         let (_, _, _, fee) = self.meet(&arriving, &offer);
         // It fills at its limit and nowhere else: what mechanisms hold against it is charged.
-        let charged: f64 = self.concessions.iter().sum::<f64>() * wanted.to_f64();
+        let charged: f64 = self.concessions.iter().sum::<f64>() * wanted.to_f64() * arriving.multiplier;
         self.fill(k, Role::Maker, wanted, limit, limit.to_f64(), fee + charged, &offer);
     }
 
@@ -253,6 +255,23 @@ impl Floor {
         let at = self.instead.iter().position(|(id, _)| *id == order.id)?;
         let (_, AnotherFill { quantity, price }) = self.instead.swap_remove(at);
         Some((quantity.unwrap_or(order.left).min(order.left), price))
+    }
+
+    /// A split: orders that wait are told in new units, and are given; those that fit no more are over. What was displayed
+    /// before is there no longer, but for a book, of which the data say how it changes.
+    pub fn split(&mut self, ratio: Ratio, held: Quantity, at: Timestamp) -> Vec<Resting> {
+        self.held = held;
+        self.taken = Taken::default();
+        if !matches!(self.shown, Shown::Depth(_)) {
+            self.shown = Shown::Nothing;
+        }
+        for k in 0..self.resting.len() {
+            if !self.resting[k].split(ratio, self.increments) {
+                self.end(k, at, Reason::Split);
+            }
+        }
+        self.sweep(at);
+        self.resting.clone()
     }
 
     pub(super) fn tell(&mut self, id: OrderId, at: Timestamp, what: What) {

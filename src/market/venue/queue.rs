@@ -112,6 +112,13 @@ impl Place {
         self.ahead = self.ahead.min(after.max(0.0));
     }
 
+    /// One unit of before is so many `units` now.
+    pub fn split(&mut self, units: f64) {
+        self.ahead *= units;
+        self.joined_behind *= units;
+        self.traded *= units;
+    }
+
     /// An order of `size` [units] that is known to have stood ahead is gone.
     pub fn left_ahead(&mut self, size: f64) {
         self.ahead = (self.ahead - size).max(0.0);

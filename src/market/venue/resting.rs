@@ -1,7 +1,8 @@
 //! Orders at the venue: those that wait for a price, and what becomes of them.
 
+use crate::market::account::Ratio;
 use crate::market::{
-    Condition, InFlight, Link, OrderId, OrderKind, Price, Quantity, Reason, Role, Side, Ticket, TimeInForce,
+    Condition, InFlight, Increments, Link, OrderId, OrderKind, Price, Quantity, Reason, Role, Side, Ticket, TimeInForce,
 };
 use crate::sim2real::Timestamp;
 
@@ -110,6 +111,24 @@ impl Resting {
                 (Some(best), Side::Buy) => best.min(price),
             });
         }
+    }
+
+    /// It is told in the units of after a split; false, and nothing changed, where a price then is on no tick or what is left
+    /// no whole number of lots.
+    pub fn split(&mut self, ratio: Ratio, increments: Increments) -> bool {
+        let Some(kind) = self.kind.split(ratio, increments) else { return false };
+        let Some(left) = ratio.whole_lots(self.left, increments) else { return false };
+        // Of an entry that has filled in part, its exits may do with what is whole of that part.
+        let released = increments.whole_lots(ratio.quantity(self.released)).min(left);
+        self.kind = kind;
+        (self.left, self.released, self.filled) = (left, released, ratio.quantity(self.filled));
+        self.extreme = self.extreme.map(|price| ratio.price(price));
+        self.place.split(ratio.to_f64());
+        let order = &mut self.order;
+        let units = ratio.to_f64();
+        (order.quantity, order.assumed, order.mid) = (order.quantity * units, order.assumed / units, order.mid / units);
+        order.average_daily_volume = order.average_daily_volume.map(|volume| volume * units);
+        true
     }
 
     /// Whether it may trade at `price`.

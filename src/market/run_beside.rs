@@ -1,0 +1,54 @@
+//! What a run reads beside market data: calendars, rates of currencies, dividends and splits.
+
+use crate::io::{FeedKind, InputError, RateSource, RunFile, file_hash};
+
+use super::account_file::AccountFiles;
+use super::run_calendar::ReadCalendars;
+use super::run_log::InputFile;
+
+/// What was read, once for all variants of a run.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Beside {
+    pub calendars: ReadCalendars,
+    pub account: AccountFiles,
+    /// Rows of each `[[data]]` that is no market data.
+    rows: Vec<Option<usize>>,
+}
+
+impl Beside {
+    /// Reads what `run` names.
+    ///
+    /// # Errors
+    /// Files that cannot be read or hold what cannot be; calendars there are none of.
+    pub fn read(run: &RunFile) -> Result<Self, InputError> {
+        let mut calendars = ReadCalendars::default();
+        calendars.of(run)?;
+        let mut account = AccountFiles::read_rates(run)?;
+        let rows = run.data.iter().map(|entry| match entry.kind {
+            FeedKind::Actions => account.read_actions(run, entry).map(Some),
+            _ => Ok(None),
+        });
+        let rows = rows.collect::<Result<_, _>>()?;
+        Ok(Self { calendars, account, rows })
+    }
+
+    /// All files `run` depends on but its document: calendars, data, rates. `rows` are those of market data, where they were read.
+    ///
+    /// # Errors
+    /// A file that cannot be read any more.
+    pub fn inputs(&self, run: &RunFile, rows: &[Option<usize>]) -> Result<Vec<InputFile>, InputError> {
+        let mut inputs = self.calendars.files.clone();
+        for (number, entry) in run.data.iter().enumerate() {
+            let of = |rows: &[Option<usize>]| rows.get(number).copied().flatten();
+            let rows = of(&self.rows).or(of(rows));
+            inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows });
+        }
+        for (number, rate) in run.rates.iter().enumerate() {
+            if let RateSource::File { path, named, .. } = &rate.source {
+                let rows = self.account.rows_of_rate(number);
+                inputs.push(InputFile { path: named.clone(), sha256: file_hash(path)?, rows });
+            }
+        }
+        Ok(inputs)
+    }
+}

@@ -1,0 +1,568 @@
+//! Accounts of runs: multipliers, currencies, dividends, splits, margin and charges, by hand and to the last unit.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails where a value is missing")]
+
+mod market_scene;
+
+use std::sync::Arc;
+
+use market_scene::{MINUTE, Plan, bar, bars, event, fills, limit, quantity, quotes, run_plan, settings, venue};
+use proptest::prelude::{ProptestConfig, any, proptest};
+use trueup::market::metric::{Costs, Counts, CurrencySummary, Metrics, RoundTrip};
+use trueup::market::{
+    Account, ActionKind, Backtest, Cash, CorporateAction, Fraction, History, Instrument, Latencies, Latency, Multiplier,
+    News, OrderId, OrderKind, Orders, Price, Quantity, Rate, Reason, Record, Requirement, Role, Sender, Settings, Side,
+    Status, Strategy, Terms, Ticket, View,
+};
+use trueup::sim2real::Timestamp;
+
+fn cash(value: f64) -> Cash {
+    Cash::nearest(value).unwrap()
+}
+
+fn at(price: f64) -> Price {
+    Price::nearest(price).unwrap()
+}
+
+fn minute(k: i64) -> Timestamp {
+    Timestamp(k * MINUTE)
+}
+
+fn buy(instrument: usize, units: f64) -> Ticket {
+    Ticket::market(instrument, Side::Buy, quantity(units))
+}
+
+fn sell(instrument: usize, units: f64) -> Ticket {
+    Ticket::market(instrument, Side::Sell, quantity(units))
+}
+
+/// An account in US dollars, of instruments with these terms.
+fn of(terms: &[Terms]) -> Account {
+    Account { currencies: vec!["USD".into()], terms: terms.to_vec(), ..Account::default() }
+}
+
+fn with(account: Account) -> Settings {
+    Settings { account: Some(Arc::new(account)), ..settings() }
+}
+
+fn run(histories: Vec<History>, parts: &[(&str, &str, f64)], account: Account, plan: Plan) -> Record {
+    run_plan(histories, parts, with(account), &mut plan.clone())
+}
+
+fn fifty() -> Terms {
+    Terms { multiplier: Multiplier::new(50).unwrap(), ..Terms::default() }
+}
+
+/// To 1e-9: the nearest float to an amount of cash is a little off.
+fn equity(record: &Record) -> Vec<f64> {
+    record.equity.iter().map(|point| nanos(point.equity)).collect()
+}
+
+fn nanos(amount: f64) -> f64 {
+    (amount * 1e9).round() / 1e9
+}
+
+fn dividend(minutes: i64, per_unit: f64, percent: u8) -> CorporateAction {
+    let kind = ActionKind::Dividend { per_unit: at(per_unit), withholding: Fraction::percent(percent) };
+    CorporateAction { at: minute(minutes), instrument: 0, kind }
+}
+
+fn split(minutes: i64, new: u32, old: u32) -> CorporateAction {
+    CorporateAction { at: minute(minutes), instrument: 0, kind: ActionKind::Split { new, old } }
+}
+
+// Bars of open and close, a minute each: what is decided on bar k meets the open of bar k + 1.
+
+/// Two contracts of 50 at 100 and a half spread of 0.10: 10,010 paid, worth 10,200 at 102.
+#[test]
+fn a_multiplier_is_in_values_costs_fees_and_leverage() {
+    let history = || bars(&[(100.0, 100.0), (100.0, 101.0), (102.0, 102.0)]);
+    let parts = [("half_spread", "bps", 10.0), ("commission", "bps", 1.0)];
+    let record = run(vec![history()], &parts, of(&[fifty()]), event(0).submit(buy(0, 2.0)));
+    // A hundredth of a percent of 10,010.
+    assert_eq!(record.blotter.fills[0].fee, cash(1.001));
+    assert_eq!(record.ledger.equity().unwrap(), cash(100_000.0 + 10_200.0 - 10_010.0 - 1.001));
+    let costs = Costs::of(&record);
+    assert!((costs.spread_and_impact - 10.0).abs() < 1e-9 && (costs.decided_value - 10_000.0).abs() < 1e-9);
+    assert!((costs.mechanisms["half_spread"] - 10.0).abs() < 1e-9, "{costs:?}");
+    let trips = RoundTrip::of(&record).unwrap();
+    assert_eq!((trips[0].gross, trips[0].entry_price, trips[0].entry_value), (cash(190.0), 100.1, cash(10_010.0)));
+    let metrics = Metrics::of(&record).unwrap();
+    let mean = equity(&record).iter().sum::<f64>() / record.equity.len() as f64;
+    assert!((metrics.turnover.unwrap() - 10_010.0 / mean).abs() < 1e-12);
+    // Ten times the equity are 200 contracts of 5,000.
+    let plan = event(0).submit(buy(0, 201.0)).submit(buy(0, 200.0)).submit(buy(0, 1.0));
+    let most = run(vec![history()], &[], of(&[fifty()]), plan);
+    assert_eq!(most.blotter.rejected[&Reason::Leverage], 2);
+    assert_eq!(fills(&most), [(MINUTE, 200.0, 100.0)]);
+    // By contract, not by what is in it; and a maker pays for a mechanism on its whole value.
+    let each = run(vec![history()], &[("commission", "per_share", 2.25)], of(&[fifty()]), event(0).submit(buy(0, 2.0)));
+    assert_eq!(each.blotter.fills[0].fee, cash(4.5));
+    let sizes = market_of_lots(fifty());
+    assert_eq!(sizes, [20.0, 20.0, 19.0]);
+}
+
+/// How many lots a strategy finds 100,000 to be worth at 100, 100 and 102.
+fn market_of_lots(terms: Terms) -> Vec<f64> {
+    struct Sizes(Vec<f64>);
+    impl Strategy for Sizes {
+        fn name(&self) -> &str {
+            "sizes"
+        }
+        fn lookback(&self) -> usize {
+            1
+        }
+        fn on_event(&mut self, view: &View<'_>, _: &mut Orders) {
+            self.0.push(view.lots_worth(0, view.equity().to_f64()).to_f64());
+            assert_eq!((view.terms(0).multiplier.get(), view.balances().len()), (50, 1));
+        }
+    }
+    let history = bars(&[(100.0, 100.0), (100.0, 100.0), (102.0, 102.0)]);
+    let instrument = market_scene::instrument("A");
+    let mut sizes = Sizes(Vec::new());
+    Backtest::new(vec![instrument], vec![history], venue(&[]), with(of(&[terms]))).unwrap().run(&mut sizes).unwrap();
+    sizes.0
+}
+
+fn in_euros(rate: Rate) -> Account {
+    let terms = Terms { currency: 1, ..Terms::default() };
+    let currencies = vec!["USD".into(), "EUR".into()];
+    Account { currencies, terms: vec![terms], rates: vec![rate], ..Account::default() }
+}
+
+/// Ten at 20.00 EUR, which close at 21 and 22: a gain of 10 and 20 EUR.
+#[test]
+fn a_foreign_share_is_a_debt_in_its_currency_and_worth_its_rate() {
+    let history = || vec![bars(&[(20.0, 20.0), (20.0, 21.0), (22.0, 22.0)])];
+    let plan = || event(0).submit(buy(0, 10.0));
+    let parts = [("commission", "per_share", 0.1)];
+    let always = run(history(), &parts, in_euros(Rate::Constant(at(1.5))), plan());
+    assert_eq!(equity(&always), [100_000.0, 100_000.0 + 1.5 * 9.0, 100_000.0 + 1.5 * 19.0]);
+    let balances = always.ledger.balances();
+    assert_eq!((balances[0].cash, balances[1].cash, balances[1].holdings), (cash(1e5), cash(-201.0), cash(220.0)));
+    let costs = Costs::of(&always);
+    assert_eq!((nanos(costs.fees), nanos(costs.decided_value)), (1.5, 300.0));
+    let trip = RoundTrip::of(&always).unwrap()[0];
+    assert_eq!((trip.gross, trip.rate), (cash(20.0), 1.5));
+    let metrics = Metrics::of(&always).unwrap();
+    assert_eq!((nanos(metrics.unrealised), nanos(metrics.final_equity)), (30.0, 100_028.5));
+    let of = CurrencySummary::of(&always, "USD").unwrap();
+    let (owed, held) = (nanos(of[1].cash), nanos(of[1].holdings));
+    assert_eq!((of[1].currency.as_str(), owed, held, of[1].rate), ("EUR", -201.0, 220.0, Some(1.5)));
+    // From its instant on, and not a nanosecond before.
+    let known = |from: i64| Rate::Known(vec![(Timestamp(0), at(1.5)), (Timestamp(from), at(2.0))]);
+    let gains = |rate| equity(&run(history(), &[], in_euros(rate), plan()))[1..].to_vec();
+    assert_eq!(gains(known(2 * MINUTE)), [100_020.0, 100_040.0]);
+    assert_eq!(gains(known(2 * MINUTE + 1)), [100_015.0, 100_040.0]);
+    assert_eq!(gains(known(3 * MINUTE + 1)), [100_015.0, 100_030.0]);
+}
+
+#[test]
+fn the_price_of_an_instrument_is_a_rate_and_a_currency_without_one_is_an_error() {
+    let rates = bars(&[(1.2, 1.2), (1.2, 1.3), (1.3, 1.25)]);
+    let account = Account {
+        currencies: vec!["USD".into(), "EUR".into()],
+        terms: vec![Terms::default(), Terms { currency: 1, ..Terms::default() }],
+        rates: vec![Rate::PriceOf(0)],
+        ..Account::default()
+    };
+    let share = bars(&[(20.0, 20.0), (20.0, 21.0), (22.0, 22.0)]);
+    // Both bars end together, and the rate is known first: the order is decided at the share's.
+    let record = run(vec![rates, share], &[], account, event(1).submit(buy(1, 10.0)));
+    assert_eq!(equity(&record)[2..], [100_000.0, 100_013.0, 100_012.5, 100_025.0]);
+    let late = in_euros(Rate::Known(vec![(minute(9), at(1.5))]));
+    let instrument = market_scene::instrument("A");
+    let history = bars(&[(20.0, 20.0), (20.0, 21.0), (22.0, 22.0)]);
+    let error = Backtest::new(vec![instrument], vec![history], venue(&[]), with(late))
+        .unwrap()
+        .run(&mut event(0).submit(buy(0, 10.0)))
+        .unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "A at 1970-01-01T00:02:00Z: there is something in EUR, and no rate of it is known yet\nhint: give [[rate]] a row \
+         that is no later than the first trade in EUR, or a constant `value`"
+    );
+}
+
+/// Ten are held before the ex-instant, ten more are bought at the open of that instant.
+#[test]
+fn a_dividend_is_paid_to_who_held_before_the_ex_instant() {
+    let history = || vec![bars(&[(20.0, 20.0), (20.0, 20.0), (19.5, 19.5), (19.5, 19.5)])];
+    let account = || Account { actions: vec![dividend(2, 0.5, 15)], ..of(&[Terms::default()]) };
+    let long = run(history(), &[], account(), event(0).submit(buy(0, 10.0)).at(1).submit(buy(0, 10.0)));
+    assert_eq!(fills(&long), [(MINUTE, 10.0, 20.0), (2 * MINUTE, 10.0, 19.5)]);
+    let booked = long.account.actions[0];
+    assert_eq!((booked.before, booked.received, booked.fills), (quantity(10.0), cash(4.25), 1));
+    // The bar that ends at the ex-instant is of the time before it.
+    assert_eq!(equity(&long), [100_000.0, 100_000.0, 100_000.0 - 5.0 + 4.25, 99_999.25]);
+    let short = run(history(), &[], account(), event(0).submit(sell(0, 10.0)));
+    assert_eq!(short.account.actions[0].received, cash(-5.0), "the lender is owed all of it");
+    assert_eq!(short.ledger.equity().unwrap(), cash(100_000.0));
+    let metrics = Metrics::of(&long).unwrap();
+    assert_eq!((metrics.dividends, metrics.withheld), (5.0, 0.75));
+    assert_eq!(Counts::of(&long).corporate_actions, 1);
+}
+
+/// Hears of actions and of what becomes of its orders.
+#[derive(Clone)]
+struct Hearing(Plan, Vec<(Timestamp, CorporateAction, f64)>);
+
+impl Strategy for Hearing {
+    fn name(&self) -> &str {
+        "hearing"
+    }
+    fn lookback(&self) -> usize {
+        1
+    }
+    fn on_event(&mut self, view: &View<'_>, orders: &mut Orders) {
+        self.0.on_event(view, orders);
+    }
+    fn on_notice(&mut self, view: &View<'_>, notice: &trueup::market::Notice, orders: &mut Orders) {
+        self.0.on_notice(view, notice, orders);
+    }
+    fn on_action(&mut self, view: &View<'_>, action: &CorporateAction, _: &mut Orders) {
+        self.1.push((view.now(), *action, view.position(0).to_f64()));
+    }
+}
+
+/// Two for one: 10 at 10 are 20 at 5. What was decided on the last bar before is met at the first open after.
+#[test]
+fn a_split_changes_positions_orders_and_marks_and_no_equity() {
+    let history = || vec![bars(&[(10.0, 10.0), (10.0, 10.0), (5.0, 5.0), (5.0, 4.4), (4.4, 6.0)])];
+    let account = || Account { actions: vec![split(2, 2, 1)], ..of(&[Terms::default()]) };
+    let plan = event(0)
+        .submit(buy(0, 10.0))
+        .submit(limit(Side::Buy, 7.0, 9.0))
+        .submit(limit(Side::Buy, 7.0, 9.01))
+        .at(1)
+        .submit(buy(0, 3.0));
+    let mut hearing = Hearing(plan, Vec::new());
+    let instruments = vec![market_scene::instrument("A")];
+    let record = Backtest::new(instruments, history(), venue(&[]), with(account())).unwrap().run(&mut hearing).unwrap();
+    assert_eq!(fills(&record), [(MINUTE, 10.0, 10.0), (2 * MINUTE, 6.0, 5.0), (4 * MINUTE, 14.0, 4.5)]);
+    assert_eq!(hearing.1, [(minute(2), split(2, 2, 1), 20.0)]);
+    let orders = &record.blotter.orders;
+    assert_eq!((orders[1].quantity, orders[1].kind), (quantity(14.0), OrderKind::Limit { price: at(4.5) }));
+    assert_eq!((orders[2].status, orders[2].reason), (Status::Cancelled, Some(Reason::Split)), "9.01 would be 4.505");
+    assert_eq!((orders[3].quantity, orders[3].filled, orders[3].decision_price), (quantity(6.0), quantity(6.0), at(5.0)));
+    // 26 at 5 close at 4.4; then 26 gain 1 and 14 gain 1.5 each.
+    assert_eq!(equity(&record), [100_000.0, 100_000.0, 100_000.0, 99_984.4, 100_047.0]);
+    // What it cost is told in the units of the fill, and nothing of it is the split.
+    assert!(record.blotter.fills.iter().take(2).all(|fill| fill.cost.timing == 0.0));
+    let trips = RoundTrip::of(&record).unwrap();
+    assert_eq!((trips.len(), trips[0].quantity, trips[0].gross), (1, 40.0, cash(47.0)));
+    assert!((trips[0].entry_price - (100.0 + 30.0 + 63.0) / 40.0).abs() < 1e-12);
+}
+
+/// Three for seven: 10 shares are 4.28, of which 4 are whole; 2 / 7 of a new share are paid for at the old mark.
+#[test]
+fn fractions_of_a_split_are_paid_out_and_leave_the_round_trip() {
+    let history = vec![bars(&[(12.0, 12.0), (12.0, 12.0), (28.0, 28.0), (28.0, 30.0)])];
+    let account = Account { actions: vec![split(2, 3, 7)], ..of(&[Terms::default()]) };
+    for (order, sign) in [(buy(0, 10.0), 1.0), (sell(0, 10.0), -1.0)] {
+        let record = run(
+            history.clone(),
+            &[],
+            account.clone(),
+            event(0).submit(order).at(2).submit(match order.side {
+                Side::Buy => sell(0, 4.0),
+                Side::Sell => buy(0, 4.0),
+            }),
+        );
+        let booked = record.account.actions[0];
+        assert_eq!((booked.after, booked.received), (quantity(sign * 4.0), cash(sign * 8.0)));
+        assert!(record.ledger.is_flat());
+        let gain = record.ledger.equity().unwrap().minus(cash(100_000.0)).unwrap();
+        assert_eq!(gain, cash(sign * (4.0 * 28.0 + 8.0 - 120.0)));
+        let trips = RoundTrip::of(&record).unwrap();
+        assert_eq!((trips.len(), trips[0].net, trips[0].exited_at), (1, gain, Some(minute(3))));
+    }
+}
+
+/// With quotes, word of a fill that is under way at the ex-instant is in by then; a dividend and a split of one instant happen
+/// in their order.
+#[test]
+fn what_is_under_way_at_a_split_is_booked_in_the_units_of_before() {
+    let rows = [(0, 9.9, 10.1), (10, 9.9, 10.1), (1_000, 4.9, 5.1), (2_000, 4.9, 5.1)];
+    let actions = vec![
+        CorporateAction { at: Timestamp(20), ..dividend(0, 1.0, 0) },
+        CorporateAction { at: Timestamp(20), ..split(0, 2, 1) },
+    ];
+    let constant = |seconds| Latency::Constant { seconds };
+    let response = constant(1e-6);
+    let latencies = Latencies { response, ..Latencies::default() };
+    let settings = Settings { latencies, ..with(Account { actions, ..of(&[Terms::default()]) }) };
+    let mut plan = event(0).submit(buy(0, 10.0)).submit(limit(Side::Sell, 10.0, 12.0)).at(1).replace(2, Some(6.0), None);
+    let record = run_plan(vec![quotes(&rows)], &[], settings, &mut plan);
+    assert_eq!(fills(&record), [(0, 10.0, 10.1)]);
+    let received: Vec<Cash> = record.account.actions.iter().map(|booked| booked.received).collect();
+    assert_eq!(received, [cash(10.0), Cash::ZERO], "ten of before, not twenty of after");
+    assert_eq!(record.ledger.positions()[0].quantity, quantity(20.0));
+    assert_eq!(record.ledger.equity().unwrap(), cash(100_000.0 + 10.0 + 20.0 * 5.0 - 101.0));
+    let (known, notice) = plan.notices[0];
+    assert_eq!((known, matches!(notice.news, News::Filled { .. })), (Timestamp(20), true));
+    // Six of before are twelve now.
+    assert_eq!(record.blotter.orders[1].quantity, quantity(12.0));
+    assert_eq!(record.blotter.orders[1].kind, OrderKind::Limit { price: at(6.0) });
+}
+
+fn regulation_t() -> Account {
+    of(&[Terms::default().with_regulation_t()])
+}
+
+#[test]
+fn an_order_that_initial_margin_does_not_carry_is_refused_unless_it_reduces() {
+    let flat = |k: usize| bars(&vec![(100.0, 100.0); k]);
+    let plan = event(0).submit(buy(0, 2_001.0)).submit(buy(0, 2_000.0)).submit(buy(0, 1.0)).at(1).submit(sell(0, 5.0));
+    let record = run(vec![flat(4)], &[], regulation_t(), plan);
+    assert_eq!((record.blotter.rejected[&Reason::Margin], record.blotter.rejections[0].quantity), (2, quantity(2_001.0)));
+    assert_eq!(fills(&record), [(MINUTE, 2_000.0, 100.0), (2 * MINUTE, 5.0, 100.0)]);
+    assert_eq!((record.account.margin_calls.len(), Counts::of(&record).broker_orders), (0, 0));
+}
+
+/// 2,000 at 100 on 100,000 of equity. At 66 equity is 32,000 and 33,000 are required: 1,000 at 16.5 a share are 61. At 65
+/// equity is 30,061 and 31,508.75 are required: 1,447.75 at 16.25 a share are 90.
+#[test]
+fn the_broker_closes_what_maintenance_takes_and_no_more() {
+    let history = || vec![bars(&[(100.0, 100.0), (100.0, 66.0), (66.0, 66.0), (66.0, 65.0), (65.0, 65.0), (65.0, 65.0)])];
+    let slow = Latencies { order: Latency::Constant { seconds: 30.0 }, ..Latencies::default() };
+    let plan = || event(0).submit(buy(0, 2_000.0)).submit(limit(Side::Sell, 1.0, 200.0));
+    let mut told = plan();
+    let record = run_plan(history(), &[("commission", "per_share", 0.0)], with(regulation_t()), &mut told);
+    assert_eq!(fills(&record), [(MINUTE, 2_000.0, 100.0), (2 * MINUTE, 61.0, 66.0), (4 * MINUTE, 90.0, 65.0)]);
+    let senders: Vec<(u64, Sender, Status)> =
+        record.blotter.orders.iter().map(|order| (order.order_id, order.sender, order.status)).collect();
+    let (strategy, broker) = (Sender::Strategy, Sender::Broker);
+    assert_eq!(
+        senders,
+        [
+            (1, strategy, Status::Filled),
+            (2, strategy, Status::Unfilled),
+            (3, broker, Status::Filled),
+            (4, broker, Status::Filled)
+        ]
+    );
+    let calls: Vec<(Timestamp, Cash, Cash)> =
+        record.account.margin_calls.iter().map(|call| (call.at, call.equity, call.required)).collect();
+    assert_eq!(calls, [(minute(2), cash(32_000.0), cash(33_000.0)), (minute(4), cash(30_061.0), cash(31_508.75))]);
+    let heard: Vec<OrderId> = told.notices.iter().map(|(_, notice)| notice.order_id).collect();
+    assert_eq!(heard, [OrderId(1), OrderId(3), OrderId(4)]);
+    // The broker needs no time that the strategy needs, which arrives half a bar later.
+    let settings = Settings { latencies: slow, ..with(regulation_t()) };
+    let late = run_plan(history(), &[], settings, &mut plan());
+    let at: Vec<i64> = fills(&late).iter().map(|fill| fill.0).collect();
+    assert_eq!(at, [2 * MINUTE], "the entry alone: 2,000 at 66 need no call");
+}
+
+/// What would add to the position is taken back before anything is closed; nobody but the broker takes back its orders.
+#[test]
+fn a_margin_call_takes_back_what_adds_and_is_the_brokers_own() {
+    let history = vec![bars(&[(100.0, 100.0), (100.0, 66.0), (66.0, 66.0), (66.0, 66.0)])];
+    let mut account = regulation_t();
+    account.terms[0].long.initial = Fraction::percent(30);
+    let plan = event(0).submit(buy(0, 2_000.0)).submit(limit(Side::Buy, 5.0, 50.0)).at(1).cancel(3);
+    let record = run(history, &[], account, plan);
+    let orders = &record.blotter.orders;
+    assert_eq!((orders[1].status, orders[1].reason), (Status::Cancelled, Some(Reason::Liquidated)));
+    assert_eq!((orders[2].sender, orders[2].filled), (Sender::Broker, quantity(61.0)));
+    assert_eq!(record.blotter.rejected[&Reason::NotOwn], 1);
+}
+
+/// Where nothing can be sold the broker does not send an order an event; where nothing is left it sends none.
+#[test]
+fn a_margin_call_sends_no_order_twice() {
+    // Quotes whose bid is empty from the fall on: the order waits.
+    let mut rows = vec![(0, 99.9, 100.1), (10, 99.9, 100.1), (20, 54.9, 55.1)];
+    rows.extend((3..50).map(|k| (10 * k, 0.0, 55.1)));
+    rows.push((500, 54.9, 55.1));
+    let constant = |seconds| Latency::Constant { seconds };
+    let latencies = Latencies { response: constant(1e-7), ..Latencies::default() };
+    let settings = Settings { latencies, ..with(regulation_t()) };
+    let record = run_plan(vec![quotes(&rows)], &[], settings, &mut event(0).submit(buy(0, 1_990.0)));
+    let by_broker = record.blotter.orders.iter().filter(|order| order.sender == Sender::Broker).count();
+    assert_eq!((by_broker, record.account.margin_calls.len()), (1, 1));
+    // Below 0 all is sold, once, and the debt stays.
+    let gone = vec![bars(&[(100.0, 100.0), (100.0, 40.0), (40.0, 40.0), (40.0, 40.0), (40.0, 40.0)])];
+    let record = run(gone, &[], regulation_t(), event(0).submit(buy(0, 2_000.0)));
+    assert_eq!(fills(&record).len(), 2);
+    assert_eq!((record.ledger.is_flat(), record.ledger.equity().unwrap()), (true, cash(-20_000.0)));
+}
+
+#[test]
+fn what_is_charged_is_told_by_kind() {
+    let day = 1_440;
+    let all = (0..4).map(|k| bar(k * day, 100.0, 100.0, 1e3)).collect();
+    let history = History::new(all, Default::default()).unwrap();
+    let parts = [("funding", "continuous", 1e-4), ("borrow_fee", "", 0.036), ("commission", "bps", 1.0)];
+    let account = of(&[fifty()]);
+    let record = run(vec![history], &parts, account, event(0).submit(sell(0, 1.0)));
+    let charges = record.ledger.income()[0].charges;
+    // 5,000 short for two days and a minute: 1e-4 of it every 8 h is received, and 0.036 a year of 360 days is paid.
+    let days = 2.0 + 1.0 / 1_440.0;
+    assert!((charges.borrow.to_f64() - 5_000.0 * 0.036 * days / 360.0).abs() < 1e-8, "{charges:?}");
+    assert!((charges.funding.to_f64() + 5_000.0 * 1e-4 * 3.0 * days).abs() < 1e-8, "{charges:?}");
+    assert_eq!((charges.other, charges.interest), (Cash::ZERO, Cash::ZERO));
+    let of = CurrencySummary::of(&record, "USD").unwrap();
+    assert_eq!((of[0].charges.borrow, of[0].charges.funding), (charges.borrow.to_f64(), charges.funding.to_f64()));
+}
+
+/// Asks for whatever it draws.
+struct Drawn(u64);
+
+impl Drawn {
+    fn draw(&mut self, below: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % below
+    }
+}
+
+impl Strategy for Drawn {
+    fn name(&self) -> &str {
+        "drawn"
+    }
+    fn lookback(&self) -> usize {
+        1
+    }
+    fn on_event(&mut self, view: &View<'_>, orders: &mut Orders) {
+        let instrument = view.event().instrument;
+        let side = if self.draw(2) == 0 { Side::Buy } else { Side::Sell };
+        let size = Quantity::nearest(1.0 + self.draw(300) as f64).unwrap();
+        match self.draw(5) {
+            0 | 1 => drop(orders.market(instrument, side, size)),
+            2 => {
+                let price = view.price(instrument).unwrap().to_f64() * (0.98 + 0.01 * self.draw(5) as f64);
+                drop(orders.limit(instrument, side, size, view.restable(instrument, side, price).unwrap()));
+            }
+            3 => {
+                let oldest = view.orders(instrument).first().map(|order| order.id);
+                oldest.into_iter().for_each(|id| orders.cancel(id));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Three instruments of their own terms on walks of 60 bars, drawn from `seed`.
+fn drawn_market(seed: u64) -> Backtest {
+    let mut draws = Drawn(seed);
+    let mut walk = |start: f64| {
+        let mut price = start;
+        let rows: Vec<(f64, f64)> = (0..60)
+            .map(|_| {
+                let open = price;
+                price = (price * (0.97 + 0.001 * draws.draw(61) as f64)).max(1.0);
+                ((open * 100.0).round() / 100.0, (price * 100.0).round() / 100.0)
+            })
+            .collect();
+        bars(&rows)
+    };
+    let histories = vec![walk(100.0), walk(40.0), walk(250.0)];
+    let margin = |initial, maintenance| Requirement {
+        initial: Fraction::percent(initial),
+        maintenance: Fraction::percent(maintenance),
+    };
+    let terms = vec![
+        Terms::default().with_regulation_t(),
+        Terms { currency: 1, long: margin(20, 15), short: margin(30, 25), ..Terms::default() },
+        Terms { currency: 2, multiplier: Multiplier::new(7).unwrap(), long: margin(10, 8), short: margin(10, 8) },
+    ];
+    let rates: Vec<_> =
+        (0..60).map(|k| (Timestamp(k * MINUTE + 7), Price(1_000_000_000 + draws.draw(300_000_001) as i64))).collect();
+    let mut actions: Vec<CorporateAction> = (0..9)
+        .map(|k| {
+            let (instrument, minutes) = (k % 3, 2 + draws.draw(57) as i64);
+            let kind = match draws.draw(3) {
+                0 => ActionKind::Split { new: 1 + draws.draw(4) as u32, old: 1 + draws.draw(4) as u32 },
+                _ => ActionKind::Dividend {
+                    per_unit: Price(1 + draws.draw(2_000_000_000) as i64),
+                    withholding: Fraction::nearest(draws.draw(300_000_000) as f64 / 1e9).unwrap(),
+                },
+            };
+            CorporateAction { at: minute(minutes), instrument, kind }
+        })
+        .collect();
+    actions.sort_by_key(|action| action.at);
+    let account = Account {
+        currencies: ["USD", "EUR", "JPY"].map(str::to_owned).to_vec(),
+        terms,
+        rates: vec![Rate::Known([vec![(Timestamp(0), at(1.1))], rates].concat()), Rate::Constant(Price(6_789_123))],
+        actions,
+    };
+    let parts =
+        [("half_spread", "bps", 3.0), ("commission", "bps", 0.7), ("borrow_fee", "", 0.4), ("participation_cap", "", 0.2)];
+    let instruments: Vec<Instrument> = ["A", "B", "C"].map(market_scene::instrument).to_vec();
+    Backtest::new(instruments, histories, venue(&parts), with(account)).unwrap()
+}
+
+/// Cash of each currency by its fills, dividends and splits alone.
+fn cash_by_hand(record: &Record) -> Vec<i128> {
+    let ledger = &record.ledger;
+    let mut all: Vec<i128> = ledger.balances().iter().map(|balance| balance.opening.0).collect();
+    for fill in &record.blotter.fills {
+        let terms = ledger.terms()[fill.instrument];
+        let value = (fill.price * fill.quantity.signed(fill.side)).0 * i128::from(terms.multiplier.get());
+        all[terms.currency] -= value + fill.fee.0;
+    }
+    for booked in &record.account.actions {
+        all[ledger.terms()[booked.action.instrument].currency] += booked.received.0;
+    }
+    for (income, terms) in ledger.income().iter().zip(ledger.terms()) {
+        all[terms.currency] -= income.charges.total().unwrap().0;
+    }
+    all
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Nothing was created and nothing lost, in each currency, to the last unit.
+    #[test]
+    fn a_run_with_everything_reconciles_to_the_last_unit(seed in any::<u64>()) {
+        let backtest = drawn_market(seed);
+        let record = backtest.run(&mut Drawn(seed ^ 0x5bd1_e995)).unwrap();
+        let ledger = &record.ledger;
+        let by_hand = cash_by_hand(&record);
+        let trips = RoundTrip::of(&record).unwrap();
+        let (mut exact, one) = (0_i128, 1_000_000_000_i128);
+        for (k, balance) in ledger.balances().iter().enumerate() {
+            assert_eq!(balance.cash.0, by_hand[k], "currency {k}");
+            let mut worth = balance.opening.0;
+            for (number, (position, income)) in ledger.positions().iter().zip(ledger.income()).enumerate() {
+                if position.currency != k {
+                    continue;
+                }
+                let gain = position.realised.0 + position.value().0 - position.basis.0;
+                let by_trips: i128 = trips.iter().filter(|trip| trip.instrument == number).map(|trip| trip.gross.0).sum();
+                assert_eq!(gain, by_trips, "instrument {number}");
+                worth += gain - position.fees.0 + income.dividends.0 - income.withheld.0 - income.charges.total().unwrap().0;
+            }
+            assert_eq!(balance.worth().unwrap().0, worth, "currency {k}");
+            exact += worth * balance.rate.map_or(one, |rate| i128::from(rate.0));
+        }
+        assert_eq!(ledger.equity().unwrap().0, exact.div_euclid(one));
+        assert_eq!(record.equity.last().unwrap().equity, ledger.equity().unwrap().to_f64());
+        let again = drawn_market(seed).run(&mut Drawn(seed ^ 0x5bd1_e995)).unwrap();
+        assert_eq!(record, again);
+        for order in &record.blotter.orders {
+            assert!(order.filled <= order.quantity && (order.sender == Sender::Strategy || order.kind == OrderKind::Market));
+        }
+        assert!(record.blotter.fills.iter().all(|fill| fill.why.role != Role::Holder));
+    }
+}
+
+/// The draws of the property do what it is about.
+#[test]
+fn the_drawn_markets_hold_every_kind_of_thing() {
+    let (mut calls, mut splits, mut paid, mut margin) = (0, 0, 0, 0);
+    for seed in 0..12 {
+        let record = drawn_market(seed).run(&mut Drawn(seed ^ 0x5bd1_e995)).unwrap();
+        calls += record.account.margin_calls.len();
+        splits += record.blotter.orders.iter().filter(|order| order.reason == Some(Reason::Split)).count();
+        paid += record.account.actions.iter().filter(|booked| booked.received != Cash::ZERO).count();
+        margin += record.blotter.rejected.get(&Reason::Margin).copied().unwrap_or_default();
+    }
+    assert!(
+        calls > 0 && splits > 0 && paid > 12 && margin > 0,
+        "{calls} calls, {splits} ended, {paid} paid, {margin} refused"
+    );
+}
