@@ -94,7 +94,10 @@ fn a_run_of_everything_by_hand() {
     let (metrics, counts) = (&run["metrics"], &run["counts"]);
     assert_eq!(number(&metrics["final_equity"]), 27_382.0);
     assert_eq!((number(&metrics["dividends"]), number(&metrics["withheld"])), (380.0 * 1.2, 95.0 * 1.2));
-    assert_eq!((&counts["margin_calls"], &counts["broker_orders"], &counts["corporate_actions"]), (&1.into(), &1.into(), &2.into()));
+    assert_eq!(
+        (&counts["margin_calls"], &counts["broker_orders"], &counts["corporate_actions"]),
+        (&1.into(), &1.into(), &2.into())
+    );
     let [usd, eur] = [0, 1].map(|k| &run["account"][k]);
     assert_eq!((number(&usd["cash"]), number(&usd["holdings"])), (12_500.0, 87_500.0));
     assert_eq!((number(&eur["cash"]), number(&eur["holdings"]), number(&eur["rate"])), (-75_715.0, 15_200.0, 1.2));
@@ -125,10 +128,15 @@ fn a_rate_may_be_the_price_of_an_instrument_and_a_margin_be_swept_over() {
         "[[instrument]]\nsymbol = \"EURUSD\"\ntick_size = 0.0001\n\n[[data]]\nsymbol = \"EURUSD\"\nbars = \"fx.csv\"\nstamp = \"open\"\n\n[[rate]]",
     );
     let folder = folder(&run.replace("weight = 1.9", "weight = 0.3"));
-    std::fs::write(folder.path("fx.csv"), bars(&[(1.25, 1.25), (1.25, 1.25), (1.25, 1.2), (1.2, 1.2), (1.2, 1.2), (1.2, 1.2)])).unwrap();
+    std::fs::write(
+        folder.path("fx.csv"),
+        bars(&[(1.25, 1.25), (1.25, 1.25), (1.25, 1.2), (1.2, 1.2), (1.2, 1.2), (1.2, 1.2)]),
+    )
+    .unwrap();
     let run = folder.json("backtest run.toml");
     assert_eq!(run["account"][1]["rate"], 1.2);
-    let swept = format!("{}\n[sweep]\nmetric = \"final_equity\"\n[sweep.ranges]\n\"instrument.S.multiplier\" = [10, 20]\n", RUN);
+    let swept =
+        format!("{}\n[sweep]\nmetric = \"final_equity\"\n[sweep.ranges]\n\"instrument.S.multiplier\" = [10, 20]\n", RUN);
     let (code, out, err) = self::folder(&swept).run("sweep run.toml --json");
     assert_eq!(code, 0, "{out}{err}");
     assert!(out.contains("27382"), "{out}");

@@ -67,9 +67,7 @@ impl Layout {
     #[must_use]
     pub fn kinds(self) -> &'static [FeedKind] {
         match self {
-            Self::Trueup => {
-                &[FeedKind::Bars, FeedKind::Quotes, FeedKind::Trades, FeedKind::Book, FeedKind::Actions]
-            }
+            Self::Trueup => &[FeedKind::Bars, FeedKind::Quotes, FeedKind::Trades, FeedKind::Book, FeedKind::Actions],
             Self::TrueupOrders | Self::BinanceDepth | Self::BitstampL3 => &[FeedKind::Book],
             Self::BinanceBookTicker => &[FeedKind::Quotes],
             Self::BinanceTrades => &[FeedKind::Trades],

@@ -75,12 +75,14 @@ impl MarginEntry {
             }
         }
         let short = (of.short_initial.unwrap_or(of.initial), of.short_maintenance.unwrap_or(of.maintenance));
-        for (key, initial, maintenance) in [("maintenance", of.initial, of.maintenance), ("short_maintenance", short.0, short.1)] {
+        for (key, initial, maintenance) in
+            [("maintenance", of.initial, of.maintenance), ("short_maintenance", short.0, short.1)]
+        {
             if maintenance > initial {
                 let message = format!("it takes {maintenance} to keep a position, and {initial} to open it");
-                let error = document.error(&["instrument", number, "margin"], message).hint(format!(
-                    "`{key}` is no more than what opens the position: who opened it would be called at once"
-                ));
+                let error = document
+                    .error(&["instrument", number, "margin"], message)
+                    .hint(format!("`{key}` is no more than what opens the position: who opened it would be called at once"));
                 return Err(error);
             }
         }

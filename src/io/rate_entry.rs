@@ -68,15 +68,15 @@ pub(super) fn rate_entries(
     let mut entries: Vec<RateEntry> = Vec::new();
     for (index, table) in tables.into_iter().enumerate() {
         let number = index.to_string();
-        let refuse = |key: &str, message: String, hint: String| {
-            Err(document.error(&["rate", &number, key], message).hint(hint))
-        };
+        let refuse =
+            |key: &str, message: String, hint: String| Err(document.error(&["rate", &number, key], message).hint(hint));
         let name = table.currency.clone();
         if !used.contains(&name) {
             let used: Vec<&String> = used.iter().collect();
             let drop = "drop the rate, or give an [[instrument]] that `currency`".to_owned();
             let hint = hint_among(&name, &used).filter(|hint| hint.starts_with("did you")).unwrap_or(drop);
-            let message = if name == base { "it is the currency of the run, whose rate is 1" } else { "no instrument is in it" };
+            let message =
+                if name == base { "it is the currency of the run, whose rate is 1" } else { "no instrument is in it" };
             return refuse("currency", format!("{message}: `{name}`"), hint);
         }
         if entries.iter().any(|entry| entry.currency == name) {
@@ -91,7 +91,10 @@ pub(super) fn rate_entries(
     match missing {
         None => Ok(entries),
         Some((index, currency)) => Err(document
-            .error(&["instrument", &index.to_string(), "currency"], format!("nothing says what `{currency}` is worth in `{base}`"))
+            .error(
+                &["instrument", &index.to_string(), "currency"],
+                format!("nothing says what `{currency}` is worth in `{base}`"),
+            )
             .hint(format!("add [[rate]] with currency = \"{currency}\" and value, file or symbol"))),
     }
 }
@@ -130,7 +133,8 @@ fn source(
                 return Err(error.maybe_hint(hint_among(&symbol, &symbols)));
             };
             if let Some(other) = instrument.currency.as_ref().filter(|currency| *currency != base) {
-                let error = document.error(&at("symbol"), format!("the price of `{symbol}` is in `{other}`, not in `{base}`"));
+                let error =
+                    document.error(&at("symbol"), format!("the price of `{symbol}` is in `{other}`, not in `{base}`"));
                 return Err(error.hint(format!("a rate is told in {base}: take an instrument with that currency")));
             }
             Ok(RateSource::PriceOf(symbol))

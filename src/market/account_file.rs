@@ -56,7 +56,10 @@ impl AccountFiles {
 /// The account of `run`; none where it is cash in one currency, and nothing happens to what is held.
 pub(super) fn account(run: &RunFile, files: AccountFiles) -> Result<Option<Arc<Account>>, InputError> {
     let has_terms = |i: &InstrumentEntry| i.currency.is_some() || i.multiplier.is_some() || i.margin.is_some();
-    if run.rates.is_empty() && !run.instruments.iter().any(has_terms) && !run.data.iter().any(|d| d.kind == FeedKind::Actions) {
+    if run.rates.is_empty()
+        && !run.instruments.iter().any(has_terms)
+        && !run.data.iter().any(|d| d.kind == FeedKind::Actions)
+    {
         return Ok(None);
     }
     let mut currencies = vec![run.run.currency.clone()];
@@ -68,10 +71,12 @@ pub(super) fn account(run: &RunFile, files: AccountFiles) -> Result<Option<Arc<A
             (RateSource::PriceOf(symbol), _) => {
                 Rate::PriceOf(run.instruments.iter().position(|i| i.symbol == *symbol).unwrap_or_default())
             }
-            (RateSource::Constant(value), _) => Rate::Constant(Price::nearest(*value).ok().filter(|rate| rate.0 > 0).ok_or_else(|| {
-                let error = run.error(&["rate", &index.to_string(), "value"], "expected at least 1e-9").found(*value);
-                error.hint("take the other currency as that of the run")
-            })?),
+            (RateSource::Constant(value), _) => {
+                Rate::Constant(Price::nearest(*value).ok().filter(|rate| rate.0 > 0).ok_or_else(|| {
+                    let error = run.error(&["rate", &index.to_string(), "value"], "expected at least 1e-9").found(*value);
+                    error.hint("take the other currency as that of the run")
+                })?)
+            }
             (RateSource::File { .. }, read) => Rate::Known(read.unwrap_or_default()),
         });
     }

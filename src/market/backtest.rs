@@ -6,8 +6,8 @@ use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
 use super::{
-    Account, AccountRecord, Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError, Matching, MoneyError,
-    QueueModel, Reference, Session, Strategy,
+    Account, AccountRecord, Cash, Execution, History, Increments, Instrument, Latencies, LatencyError, Ledger, LedgerError,
+    Matching, MoneyError, QueueModel, Reference, Session, Strategy,
 };
 
 /// A backtest, as it was set up.
@@ -113,7 +113,9 @@ pub enum BacktestError {
         known_at: Timestamp,
     },
     /// An account that does not say on which terms each instrument is held.
-    #[error("there are terms for {terms} of {instruments} instruments\nhint: give terms for each instrument, in their order")]
+    #[error(
+        "there are terms for {terms} of {instruments} instruments\nhint: give terms for each instrument, in their order"
+    )]
     Terms {
         /// Number of terms.
         terms: usize,

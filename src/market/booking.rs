@@ -1,10 +1,12 @@
 //! What becomes of orders: it is on its way for a while, and is booked when it is known.
 
+use crate::sim2real::Timestamp;
+
 use super::agenda::{Due, Phase};
 use super::backtest::BacktestError;
 use super::session::Session;
 use super::venue::{Filled, Outcome, What};
-use super::{Cash, Fill, FillCost, News, Notice, Quantity, Status, Trade, Why};
+use super::{Cash, Event, EventKind, Fill, FillCost, News, Notice, Orders, Quantity, Status, Strategy, Trade, View, Why};
 
 impl Session<'_> {
     /// Takes what happened on a floor, which its owner will know in a while.
@@ -44,6 +46,30 @@ impl Session<'_> {
         let at = self.clocks.response(outcome.at);
         let place = self.mail.put(outcome, terms);
         self.agenda.put(at, Phase::Notices, Due::Notice(place));
+    }
+
+    /// The strategy learns what became of an order.
+    pub(super) fn deliver(
+        &mut self,
+        place: usize,
+        at: Timestamp,
+        strategy: Option<&mut dyn Strategy>,
+    ) -> Result<(), BacktestError> {
+        let notice = self.note(place)?;
+        if let (Some(notice), Some(strategy)) = (notice, strategy) {
+            let event = Event { time: at, instrument: notice.instrument, kind: EventKind::Timer };
+            self.tell(event, |view, orders| strategy.on_notice(view, &notice, orders))?;
+        }
+        Ok(())
+    }
+
+    /// The strategy is told something that is no event, and may ask for orders.
+    pub(super) fn tell(&mut self, event: Event, hears: impl FnOnce(&View<'_>, &mut Orders)) -> Result<(), BacktestError> {
+        let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
+        let (view, orders) = self.view(event, equity);
+        hears(&view, orders);
+        self.send_asked(event.time, equity);
+        Ok(())
     }
 
     /// What became of an order is known: it is booked.

@@ -4,9 +4,7 @@ use super::account::MarginCall;
 use super::agenda::{Due, Phase};
 use super::backtest::BacktestError;
 use super::session::Session;
-use super::{
-    Cash, Closing, Condition, Event, Ledger, Margin, MoneyError, OrderId, Quantity, Sender, Side, Ticket, Trade,
-};
+use super::{Cash, Closing, Condition, Event, Ledger, Margin, MoneyError, OrderId, Quantity, Sender, Side, Ticket, Trade};
 
 impl Session<'_> {
     /// Whether equity covers the initial margin of what is held with all that is under way and an order beside, or the order
@@ -82,7 +80,8 @@ impl Session<'_> {
         let mut ledger = self.ledger.clone();
         for (instrument, known) in self.known.iter().enumerate() {
             for order in &known.orders {
-                let by_broker = self.blotter.place(order.id).is_some_and(|k| self.blotter.orders[k].sender == Sender::Broker);
+                let by_broker =
+                    self.blotter.place(order.id).is_some_and(|k| self.blotter.orders[k].sender == Sender::Broker);
                 let position = ledger.positions()[instrument];
                 // No more than closes what is held, as the venue has it.
                 let closes = (-position.quantity.signed(order.side)).max(Quantity::ZERO);

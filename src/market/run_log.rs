@@ -216,7 +216,7 @@ impl Record {
             .floats("stop_price", orders.iter().map(|o| o.kind.trigger().map(Price::to_f64)))
             .texts("time_in_force", orders.iter().map(|o| o.time_in_force.word().to_owned()))
             .times("arrives_at", orders.iter().map(|o| o.arrives_at))
-                .texts("reason", orders.iter().map(|o| o.reason.map(|reason| reason.word().to_owned())))
+            .texts("reason", orders.iter().map(|o| o.reason.map(|reason| reason.word().to_owned())))
             .texts("sent_by", orders.iter().map(|o| o.sender.word().to_owned()))
     }
 

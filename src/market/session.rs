@@ -5,7 +5,7 @@ use std::fmt;
 
 use crate::sim2real::Timestamp;
 
-use super::account::{Keeping, amount};
+use super::account::Keeping;
 use super::agenda::{Agenda, Due, Phase};
 use super::backtest::{Backtest, BacktestError, EquityPoint, Held, Record, Settings};
 use super::blotter::Blotter;
@@ -23,7 +23,7 @@ use super::{
 /// A backtest under way.
 pub struct Session<'d> {
     pub(super) setup: &'d Backtest,
-    feed: Feed<'d>,
+    pub(super) feed: Feed<'d>,
     transit: Transit,
     /// Data take no time to the strategy but what their own two times say.
     direct: bool,
@@ -219,34 +219,6 @@ impl<'d> Session<'d> {
         }
     }
 
-    /// The strategy learns what became of an order.
-    pub(super) fn deliver(
-        &mut self,
-        place: usize,
-        at: Timestamp,
-        strategy: Option<&mut dyn Strategy>,
-    ) -> Result<(), BacktestError> {
-        let notice = self.note(place)?;
-        if let (Some(notice), Some(strategy)) = (notice, strategy) {
-            let event = Event { time: at, instrument: notice.instrument, kind: EventKind::Timer };
-            self.tell(event, |view, orders| strategy.on_notice(view, &notice, orders))?;
-        }
-        Ok(())
-    }
-
-    /// The strategy is told something that is no event, and may ask for orders.
-    pub(super) fn tell(
-        &mut self,
-        event: Event,
-        hears: impl FnOnce(&View<'_>, &mut Orders),
-    ) -> Result<(), BacktestError> {
-        let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
-        let (view, orders) = self.view(event, equity);
-        hears(&view, orders);
-        self.send_asked(event.time, equity);
-        Ok(())
-    }
-
     /// Something happens at the exchange: orders that wait there meet it.
     #[inline(always)]
     fn happen(&mut self, arrival: &Arrival) -> Result<(), BacktestError> {
@@ -334,7 +306,7 @@ impl<'d> Session<'d> {
     }
 
     #[inline(always)]
-    fn view(&mut self, event: Event, equity: Cash) -> (View<'_>, &mut Orders) {
+    pub(super) fn view(&mut self, event: Event, equity: Cash) -> (View<'_>, &mut Orders) {
         let view = View {
             event,
             known: &self.known,
@@ -347,7 +319,7 @@ impl<'d> Session<'d> {
     }
 
     #[inline(always)]
-    fn send_asked(&mut self, now: Timestamp, equity: Cash) {
+    pub(super) fn send_asked(&mut self, now: Timestamp, equity: Cash) {
         if !self.orders.requests().is_empty() {
             self.send_all(now, equity);
         }
@@ -400,30 +372,6 @@ impl<'d> Session<'d> {
             }
         }
         self.equity.push(EquityPoint { time, equity });
-    }
-
-    pub(super) fn money(&self, event: Event, error: MoneyError) -> BacktestError {
-        let symbol = &self.setup.instruments[event.instrument].symbol;
-        self.amount(format!("{symbol} at {}", event.time), error)
-    }
-
-    fn amount(&self, place: String, error: MoneyError) -> BacktestError {
-        amount(place, error, self.setup.settings.account.as_deref())
-    }
-
-    /// Whether a bar ends at the instant of the action that is due next, and has not been seen yet.
-    #[cold]
-    fn a_bar_of_that_instant_ends(&self, at: Timestamp) -> bool {
-        let (Some(Due::Action(number)), Some(keeping)) = (self.agenda.next_due(), &self.keeping) else { return false };
-        let instrument = keeping.account.actions[number].instrument;
-        let row = self.feed.next_bar(instrument);
-        row.and_then(|row| self.setup.histories[instrument].bars().get(row)).is_some_and(|bar| bar.known_at == at)
-    }
-
-    /// Whether what is due has to wait for a bar that ends at its instant, which is of the time before an action.
-    #[inline(always)]
-    fn a_bar_ends_first(&self, (at, phase): (Timestamp, Phase)) -> bool {
-        phase == Phase::Acts && self.a_bar_of_that_instant_ends(at)
     }
 }
 

@@ -5,8 +5,8 @@ use crate::sim2real::Timestamp;
 use super::known::Known;
 use super::rates::multiplied;
 use super::{
-    Balance, Bar, Bracket, Cash, Condition, CorporateAction, DepthBook, Increments, Instrument, Ledger, Link, Margin, OpenOrder, OrderId, OrderKind, Price,
-    Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Terms, Ticket,
+    Balance, Bar, Bracket, Cash, Condition, CorporateAction, DepthBook, Increments, Instrument, Ledger, Link, Margin,
+    OpenOrder, OrderId, OrderKind, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Terms, Ticket,
 };
 
 /// What brought an event about; in the order in which they come at one instant.

@@ -210,7 +210,9 @@ fn charges(record: &Record) -> Result<f64, MoneyError> {
     };
     let held = all.map(one).try_fold(0.0, |sum, charge| Ok::<_, MoneyError>(sum + charge?))?;
     let on_cash = record.ledger.balances().iter().enumerate();
-    on_cash.map(|(k, balance)| Ok(balance.charges.total()?.to_f64() * record.rate_of(k))).try_fold(held, |sum, charge| Ok(sum + charge?))
+    on_cash
+        .map(|(k, balance)| Ok(balance.charges.total()?.to_f64() * record.rate_of(k)))
+        .try_fold(held, |sum, charge| Ok(sum + charge?))
 }
 
 /// Dividends before tax and tax withheld [currency].
