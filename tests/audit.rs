@@ -167,6 +167,8 @@ fn at_the_same_close(backtest: &Backtest, strategy: &mut dyn Strategy) -> Result
         quantity: order.quantity,
         price: order.decision_price,
         fee: Cash::default(),
+        decision_price: order.decision_price,
+        rate: 1.0,
         realised: None,
         cost: FillCost::default(),
         why: trueup::market::Why {

@@ -42,7 +42,7 @@ fn a_run_whose_data_are_streamed_is_the_same() {
         let name = format!("a/{table}.parquet");
         assert_eq!(whole.bytes(&name), streamed.bytes(&name), "{table}");
     }
-    let spans = [("[run]", "[run]\nstart = \"2024-03-05T00:00:00Z\"\nend = \"2024-03-06T00:00:00Z\"")];
+    let spans = [("[run]", "[run]\nstart = \"2024-08-06T00:00:00Z\"\nend = \"2024-08-07T00:00:00Z\"")];
     let (whole, streamed) =
         (scene(&spans), scene(&[spans[0], ("[run]", "[run]\nstream = true"), ("[[data]]", "[[data]]\ninterval = \"1m\"")]));
     let (one, other) = (whole.json("backtest run.toml"), streamed.json("backtest run.toml"));
@@ -65,7 +65,7 @@ fn a_thin_equity_curve_has_few_points() {
 fn a_run_that_was_stopped_goes_on_and_ends_the_same() {
     let scene = scene(&[]);
     let whole = scene.json("backtest run.toml");
-    for (k, moment) in ["event:700", "order:3", "2024-03-06T15:00:00Z"].into_iter().enumerate() {
+    for (k, moment) in ["event:700", "order:3", "2024-08-07T15:00:00Z"].into_iter().enumerate() {
         let (code, out, err) = scene.run(&format!("backtest run.toml --save c{k}.json --at {moment}"));
         assert_eq!((code, err.as_str()), (0, ""));
         assert!(out.starts_with("Stopped after ") && out.contains(&format!("--resume c{k}.json")), "{out}");

@@ -6,6 +6,7 @@
 
 #![no_main]
 
+mod account;
 mod columnar;
 mod csv;
 mod equations;
@@ -31,7 +32,8 @@ use scene::Scene;
 type Target = (&'static str, fn(&Scene, &[u8]));
 
 /// The targets, by their names, which are those of their folders in `fuzz/seeds`.
-const TARGETS: [Target; 15] = [
+const TARGETS: [Target; 16] = [
+    ("account", account::target),
     ("arrow", columnar::arrow),
     ("chunks", stream::chunks),
     ("csv", csv::plain),

@@ -7,8 +7,8 @@ use crate::sim2real::Timestamp;
 
 use super::agenda::{Agenda, Due, Phase};
 use super::{
-    BacktestError, Cash, Fraction, History, Increments, Instrument, Ledger, LedgerError, MoneyError, Price, Quantity,
-    Settings, Terms,
+    BacktestError, Cash, Event, Fraction, History, Increments, Instrument, Ledger, LedgerError, MoneyError, Price, Quantity,
+    Session, Settings, Terms,
 };
 
 /// How the account of a run is kept.
@@ -295,13 +295,48 @@ fn nearest(number: i64, by: u32, over: u32) -> i64 {
     i64::try_from(size).unwrap_or(if size > 0 { i64::MAX } else { i64::MIN })
 }
 
-/// The error of an amount that could not be told at `place`.
-pub(super) fn amount(place: String, error: MoneyError, account: Option<&Account>) -> BacktestError {
-    match error {
-        MoneyError::NoRate { currency } => {
-            let name = account.and_then(|account| account.currencies.get(currency)).cloned().unwrap_or_default();
-            BacktestError::NoRate { place, currency: name }
+impl Session<'_> {
+    /// The error of an amount at an event.
+    pub(super) fn money(&self, event: Event, error: MoneyError) -> BacktestError {
+        let symbol = &self.setup.instruments[event.instrument].symbol;
+        self.amount(format!("{symbol} at {}", event.time), error)
+    }
+
+    /// The error of an amount at `place`: a currency without a rate is told by its name.
+    pub(super) fn amount(&self, place: String, error: MoneyError) -> BacktestError {
+        let account = self.setup.settings.account.as_ref();
+        match error {
+            MoneyError::NoRate { currency } => {
+                let name = account.and_then(|account| account.currencies.get(currency)).cloned().unwrap_or_default();
+                BacktestError::NoRate { place, currency: name }
+            }
+            error => BacktestError::Money { place, error },
         }
-        error => BacktestError::Money { place, error },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three for two at 10.01: a third is no whole 1e-9, and 1.5 units are no whole lot.
+    #[test]
+    fn a_ratio_is_exact_or_says_so() {
+        let ratio = Ratio { new: 3, old: 2 };
+        let instrument = Instrument {
+            symbol: "A".into(),
+            tick_size: 0.01,
+            lot_size: 1.0,
+            average_daily_volume: None,
+            daily_volatility: None,
+        };
+        let steps = Increments::of(&instrument).unwrap();
+        assert_eq!(ratio.price(Price(10_010_000_000)), Price(6_673_333_333));
+        assert_eq!(ratio.price(Price(-5)), Price(-3), "half away from 0");
+        assert_eq!(ratio.price_on_tick(Price(10_010_000_000), steps), None);
+        assert_eq!(ratio.price_on_tick(Price(12_000_000_000), steps), Some(Price(8_000_000_000)));
+        assert_eq!(ratio.whole_lots(Quantity(1_000_000_000), steps), None);
+        assert_eq!(ratio.whole_lots(Quantity(4_000_000_000), steps), Some(Quantity(6_000_000_000)));
+        assert_eq!(ratio.quantity(Quantity(i64::MAX)), Quantity(i64::MAX), "as far as 64 bits reach");
     }
 }

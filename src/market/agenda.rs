@@ -112,4 +112,25 @@ mod tests {
         let order: Vec<Due> = std::iter::from_fn(|| agenda.pop().map(|(_, due)| due)).collect();
         assert_eq!(order, [3, 2, 1, 4].map(|id| Due::Arrive(OrderId(id))));
     }
+
+    #[test]
+    fn what_is_revised_stays_in_its_order_and_is_seen_in_it() {
+        let mut agenda = Agenda::default();
+        for (time, id) in [(5, 1), (3, 2), (5, 3), (4, 4)] {
+            agenda.put(Timestamp(time), Phase::AtOnce, Due::Arrive(OrderId(id)));
+        }
+        let mut seen = Vec::new();
+        agenda.revise(|due| {
+            seen.push(due);
+            match due {
+                Due::Arrive(OrderId(4)) => None,
+                Due::Arrive(OrderId(1)) => Some(Due::Revoke(OrderId(1))),
+                other => Some(other),
+            }
+        });
+        assert_eq!(seen, [2, 4, 1, 3].map(|id| Due::Arrive(OrderId(id))));
+        assert_eq!(agenda.next_due(), Some(Due::Arrive(OrderId(2))));
+        let order: Vec<Due> = std::iter::from_fn(|| agenda.pop().map(|(_, due)| due)).collect();
+        assert_eq!(order, [Due::Arrive(OrderId(2)), Due::Revoke(OrderId(1)), Due::Arrive(OrderId(3))]);
+    }
 }

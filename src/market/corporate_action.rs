@@ -3,7 +3,7 @@
 use crate::sim2real::Timestamp;
 
 use super::account::{ActionKind, BookedAction, CorporateAction, Ratio};
-use super::agenda::Due;
+use super::agenda::{Due, Phase};
 use super::backtest::BacktestError;
 use super::session::Session;
 use super::venue::Resting;
@@ -46,6 +46,21 @@ impl Session<'_> {
         let Some(strategy) = strategy else { return Ok(()) };
         let event = Event { time: at, instrument: action.instrument, kind: EventKind::Timer };
         self.tell(event, |view, orders| strategy.on_action(view, &action, orders))
+    }
+
+    /// Whether a bar ends at the instant of the action that is due next, and has not been seen yet.
+    #[cold]
+    fn a_bar_of_that_instant_ends(&self, at: Timestamp) -> bool {
+        let (Some(Due::Action(number)), Some(keeping)) = (self.agenda.next_due(), &self.keeping) else { return false };
+        let instrument = keeping.account.actions[number].instrument;
+        let row = self.feed.next_bar(instrument);
+        row.and_then(|row| self.setup.histories[instrument].bars().get(row)).is_some_and(|bar| bar.known_at == at)
+    }
+
+    /// Whether what is due has to wait for a bar that ends at its instant, which is of the time before an action.
+    #[inline(always)]
+    pub(super) fn a_bar_ends_first(&self, (at, phase): (Timestamp, Phase)) -> bool {
+        phase == Phase::Acts && self.a_bar_of_that_instant_ends(at)
     }
 
     fn book_action(&mut self, action: &CorporateAction) -> Result<(), BacktestError> {

@@ -179,18 +179,20 @@ fn joined(run: &RunFile, index: usize, symbol: &str, read: &mut [Option<History>
     };
     let Some((start, last)) = span(run) else { return Ok(whole) };
     let within = whole.within(start, last);
-    if within.is_empty() {
-        let key = if run.run.start.is_some() { "start" } else { "end" };
-        let error = run.error(&["run", key], format!("there are no data of `{symbol}` between `start` and `end`"));
-        return Err(error.hint("leave them out to run on all data; times without a zone in files are UTC unless declared"));
-    }
-    Ok(within)
+    if within.is_empty() { Err(no_data_within(run, symbol)) } else { Ok(within) }
 }
 
 /// The error about an instrument without data.
 pub(super) fn no_data(run: &RunFile, index: usize, symbol: &str) -> InputError {
     let error = run.error(&["instrument", &index.to_string()], format!("there are no data of `{symbol}`"));
     error.hint("add [[data]] with its symbol and bars, quotes, trades or book, or drop the instrument")
+}
+
+/// The error about an instrument without data between the run's `start` and `end`.
+pub(super) fn no_data_within(run: &RunFile, symbol: &str) -> InputError {
+    let key = if run.run.start.is_some() { "start" } else { "end" };
+    let error = run.error(&["run", key], format!("there are no data of `{symbol}` between `start` and `end`"));
+    error.hint("leave them out to run on all data; times without a zone in files are UTC unless declared")
 }
 
 /// The first and the last instant whose data count; none where all do.

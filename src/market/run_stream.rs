@@ -4,7 +4,7 @@ use crate::io::{DataEntry, FeedKind, InputError, RunFile, TableChunks};
 use crate::sim2real::Timestamp;
 
 use super::line::Line;
-use super::run::{no_data, provenance, settings, span, venue};
+use super::run::{no_data, no_data_within, provenance, settings, span, venue};
 use super::run_beside::Beside;
 use super::stream::{Between, Dated, Stream, StreamError};
 use super::{Backtest, BacktestError, FileStream, History, Instrument, PreparedRun, Session, Sources, run_needs};
@@ -18,6 +18,9 @@ pub fn prepare_streaming_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     let venue = venue(run)?;
     let begun = sources(run)?.into_iter().map(|sources| Ok(Line::of(sources)?.into_at_hand()));
     let begun = begun.collect::<Result<Vec<History>, StreamError>>().map_err(|error| input(run, error))?;
+    if let Some(empty) = begun.iter().position(History::is_empty).filter(|_| span(run).is_some()) {
+        return Err(no_data_within(run, &run.instruments[empty].symbol));
+    }
     let instruments: Vec<Instrument> = run.instruments.iter().map(Instrument::from).collect();
     run_needs::check(run, &venue, &instruments, &begun)?;
     let beside = Beside::read(run)?;

@@ -5,7 +5,7 @@ use std::fmt;
 
 use crate::sim2real::Timestamp;
 
-use super::account::{Keeping, amount};
+use super::account::Keeping;
 use super::agenda::{Agenda, Due, Phase};
 use super::backtest::{Backtest, BacktestError, Held, Record, Settings};
 use super::blotter::Blotter;
@@ -18,9 +18,7 @@ use super::line::{Line, RowKind};
 use super::mail::Mail;
 use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
-use super::{
-    Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, MoneyError, OrderId, Orders, Reference, Strategy,
-};
+use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, OrderId, Orders, Reference, Strategy};
 
 mod exchange;
 mod telling;
@@ -295,29 +293,5 @@ impl<'d> Session<'d> {
             }
             due => self.at_venue(at, due).map(|()| None),
         }
-    }
-
-    pub(super) fn money(&self, event: Event, error: MoneyError) -> BacktestError {
-        let symbol = &self.setup.instruments[event.instrument].symbol;
-        self.amount(format!("{symbol} at {}", event.time), error)
-    }
-
-    fn amount(&self, place: String, error: MoneyError) -> BacktestError {
-        amount(place, error, self.setup.settings.account.as_deref())
-    }
-
-    /// Whether a bar ends at the instant of the action that is due next, and has not been seen yet.
-    #[cold]
-    fn a_bar_of_that_instant_ends(&self, at: Timestamp) -> bool {
-        let (Some(Due::Action(number)), Some(keeping)) = (self.agenda.next_due(), &self.keeping) else { return false };
-        let instrument = keeping.account.actions[number].instrument;
-        let row = self.feed.next_bar(instrument);
-        row.and_then(|row| self.feed.line(instrument).bar(row)).is_some_and(|bar| bar.known_at == at)
-    }
-
-    /// Whether what is due has to wait for a bar that ends at its instant, which is of the time before an action.
-    #[inline(always)]
-    fn a_bar_ends_first(&self, (at, phase): (Timestamp, Phase)) -> bool {
-        phase == Phase::Acts && self.a_bar_of_that_instant_ends(at)
     }
 }

@@ -29,7 +29,7 @@ impl Session<'_> {
     }
 
     #[inline(always)]
-    fn view(&mut self, event: Event, equity: Cash) -> (View<'_>, &mut Orders) {
+    pub(in crate::market) fn view(&mut self, event: Event, equity: Cash) -> (View<'_>, &mut Orders) {
         let view = View {
             event,
             known: &self.known,
@@ -43,7 +43,7 @@ impl Session<'_> {
     }
 
     #[inline(always)]
-    pub(super) fn send_asked(&mut self, now: Timestamp, equity: Cash) {
+    pub(in crate::market) fn send_asked(&mut self, now: Timestamp, equity: Cash) {
         if !self.orders.requests().is_empty() {
             self.send_all(now, equity);
         }
