@@ -71,14 +71,14 @@ class Checks:
     def __init__(self, program, folder):
         self.program, self.folder = program, folder
 
-    def ours(self, name, bars, rule, **more):
-        return trueup_run.run(self.program, self.folder / name, bars, rule, CASH, **more)
+    def ours(self, name, rule, **more):
+        return trueup_run.run(self.program, self.folder / name, {"kind": "sma_cross"} | rule, CASH, **more)
 
     def on_bars(self, name, bars, rule, commission="no commission", **theirs):
         """Books of both on bars. `theirs`: options of the other engine."""
         mechanisms, charged = COMMISSIONS[commission]
         engine = import_module("backtesting_run")
-        return self.ours(name, bars, rule, mechanisms=mechanisms), engine.run(
+        return self.ours(name, rule, bars=bars, mechanisms=mechanisms), engine.run(
             bars, rule, CASH, commission=charged, **theirs
         )
 
@@ -89,7 +89,8 @@ class Checks:
         mechanisms = [("half_spread", {"fraction": 1.0}), *COMMISSIONS[commission][0]]
         charged = {"2 bps": {"bps": 2}, "0.005 a unit": {"per_share": 0.005}}.get(commission, {})
         engine = import_module("nautilus_run")
-        return self.ours(name, bars, rule, mechanisms=mechanisms, latency=LATENCY / 1e9, quotes=quotes), engine.run(
+        latency = {"order": LATENCY / 1e9}
+        return self.ours(name, rule, bars=bars, quotes=quotes, mechanisms=mechanisms, latency=latency), engine.run(
             bars, quotes, rule, CASH, latency=LATENCY, **charged, **theirs
         )
 

@@ -6,6 +6,8 @@ from random import Random
 from generated_market import FIRST, NANOS
 
 MICRO = 1_000
+# Between any two events lies this at least [ns].
+GAP = 50_000 * MICRO
 LEVELS = 5
 
 
@@ -62,7 +64,7 @@ class Walk:
         there = self.sides[side][price]
         size = min(self.random.randrange(1, 120), there)
         self.events.append(Trade(self.time, price, size, aggressor))
-        self.wait(MICRO)
+        self.wait(GAP)
         left = there - size
         self.set(side, price, left - (self.random.randrange(left // 2 + 1) if merged else 0))
 
@@ -84,7 +86,7 @@ class Walk:
     def fill_up(self):
         for side, away in (("buy", -1), ("sell", 1)):
             while len(self.sides[side]) < LEVELS:
-                self.wait(MICRO)
+                self.wait(GAP)
                 end = min(self.sides[side], default=self.best("sell") - 1) if side == "buy" else max(
                     self.sides[side], default=self.best("buy") + 1
                 )
@@ -95,7 +97,7 @@ def book(seed, steps, *, merged=False):
     """What happens to a book in `steps` steps; after the last it is silent, so that all that is under way arrives."""
     walk = Walk(seed)
     for _ in range(steps):
-        walk.wait(MICRO * walk.random.randrange(20_000, 400_000))
+        walk.wait(GAP + MICRO * walk.random.randrange(400_000))
         drawn = walk.random.randrange(100)
         if drawn < 25:
             walk.trade(merged)

@@ -8,7 +8,7 @@ from numba import njit
 
 from books import Books, Fill
 from generated_book import Trade
-from generated_market import TICK
+from generated_market import NANOS, TICK
 
 FEED, RESPONSE = 2, 3
 OVER = 1
@@ -16,8 +16,9 @@ OVER = 1
 
 def table(events, feed):
     """The events as the engine has them; `feed` [ns] is how long they take to the strategy."""
-    rows = np.zeros(len(events), dtype=engine.event_dtype)
-    for k, event in enumerate(events):
+    rows = np.zeros(len(events) + 1, dtype=engine.event_dtype)
+    # It is over before the strategy sees the last event, so there is one more of these.
+    for k, event in enumerate([*events, events[-1]]):
         traded = isinstance(event, Trade)
         side = event.aggressor if traded else event.side
         kind = engine.TRADE_EVENT if traded else engine.DEPTH_EVENT
@@ -25,6 +26,8 @@ def table(events, feed):
         rows[k]["ev"] = kind | flags
         rows[k]["exch_ts"], rows[k]["local_ts"] = event.time, event.time + feed
         rows[k]["px"], rows[k]["qty"] = round(event.price * TICK, 2), event.size
+    rows[-1]["exch_ts"] += NANOS
+    rows[-1]["local_ts"] += NANOS
     return rows
 
 
@@ -42,14 +45,15 @@ def quoted(mid, inventory, left, gamma, kappa, sigma, most, side):
 
 
 @njit
-def follow(hbt, gamma, kappa, sigma, most, size, horizon, step, times, equity, fills, quantities):
-    """Quotes both sides at every event of the market; the number of events seen and of fills."""
+def follow(hbt, gamma, kappa, sigma, most, size, horizon, step, fee, counted, times, equity, fills, quantities):
+    """Quotes both sides at every event of the market; the number of events seen and of fills. `fee`: of the notional."""
     own = np.zeros(2, dtype=np.uint64)
     last_left = {np.uint64(0): 0.0}
     asked = np.uint64(0)
     began = np.int64(-1)
     seen = 0
     filled = 0
+    held, cash = 0.0, 0.0
     while True:
         what = hbt.wait_next_feed(True, np.int64(60_000_000_000))
         if what == OVER:
@@ -65,6 +69,9 @@ def follow(hbt, gamma, kappa, sigma, most, size, horizon, step, times, equity, f
                     fills[filled, 1] = order.side
                     fills[filled, 2] = order.exec_price_tick
                     quantities[filled] = taken
+                    price = order.exec_price_tick * 0.01
+                    held += order.side * taken
+                    cash -= order.side * taken * price + fee * taken * price
                     last_left[order.order_id] = order.leaves_qty
                     filled += 1
             continue
@@ -75,13 +82,15 @@ def follow(hbt, gamma, kappa, sigma, most, size, horizon, step, times, equity, f
             began = now
         left = horizon - ((now - began) * 1e-9) % horizon
         mid = (depth.best_bid_tick + depth.best_ask_tick) * 0.005
-        values = hbt.state_values(0)
+        if not counted:
+            values = hbt.state_values(0)
+            held, cash = values.position, values.balance - values.fee
         times[seen] = now
-        equity[seen] = values.balance + values.position * mid - values.fee
+        equity[seen] = cash + held * mid
         seen += 1
         for k in range(2):
             side = 1 if k == 0 else -1
-            best = quoted(mid, values.position, left, gamma, kappa, sigma, most, side)
+            best = quoted(mid, held, left, gamma, kappa, sigma, most, side)
             works = False
             limit = 0
             orders = hbt.orders(0)
@@ -103,8 +112,11 @@ def follow(hbt, gamma, kappa, sigma, most, size, horizon, step, times, equity, f
                     hbt.submit_sell_order(0, asked, best * 0.01, size, engine.GTX, engine.LIMIT, False)
 
 
-def run(events, maker, cash, *, feed, order, response, queue, maker_bps=0.0, lot=1.0):
-    """The books of the maker; latencies in ns, `queue` a method of the asset and its arguments."""
+def run(events, maker, cash, *, feed, order, response, queue, maker_bps=0.0, lot=1.0, counted=True):
+    """The books of the maker; latencies in ns, `queue` a method of the asset and its arguments.
+
+    `counted`: position and cash are counted from what the orders say of themselves, and not those of `state_values`.
+    """
     # The engine reads the table where it is: it must not go before the run is over.
     rows = table(events, feed)
     asset = BacktestAsset().data(rows).linear_asset(1.0).constant_order_latency(order, response)
@@ -114,7 +126,7 @@ def run(events, maker, cash, *, feed, order, response, queue, maker_bps=0.0, lot
     times, equity = np.zeros(len(events), dtype=np.int64), np.zeros(len(events))
     fills, quantities = np.zeros((len(events), 3), dtype=np.int64), np.zeros(len(events))
     names = ("gamma", "kappa", "sigma", "max_inventory", "size", "horizon", "step")
-    seen, filled = follow(hbt, *(maker[name] for name in names), times, equity, fills, quantities)
+    seen, filled = follow(hbt, *(maker[name] for name in names), maker_bps * 1e-4, counted, times, equity, fills, quantities)
     hbt.close()
     del rows
     books = Books(equity={int(t): cash + float(e) for t, e in zip(times[:seen], equity[:seen])})

@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from books import Books, Fill
+from generated_book import Change, Trade
 from generated_market import TICK
 
 
@@ -26,36 +27,52 @@ def write_quotes(path, quotes):
     pq.write_table(pa.table(columns), path)
 
 
-def document(rule, cash, mechanisms, latency, quotes):
-    """RUN.toml."""
-    lines = [
-        f"[run]\nseed = 1\ncash = {cash}\ncurrency = \"USD\"\n",
-        f"[[instrument]]\nsymbol = \"XYZ\"\ntick_size = {TICK}\nlot_size = 1\n",
-        "[[data]]\nsymbol = \"XYZ\"\nbars = \"bars.parquet\"\nstamp = \"open\"\n",
-    ]
-    if quotes:
-        lines.append("[[data]]\nsymbol = \"XYZ\"\nquotes = \"quotes.parquet\"\n")
-    short = "true" if rule["short"] else "false"
-    lines.append(
-        f"[strategy]\nkind = \"sma_cross\"\nfast = {rule['fast']}\nslow = {rule['slow']}\nshort = {short}\n"
-        f"weight = {rule['weight']}\n"
-    )
-    if latency:
-        lines.append(f"[latency]\norder = {latency}\n")
-    for name, parameters in mechanisms:
-        values = "".join(f"{key} = {value}\n" for key, value in parameters.items())
-        lines.append(f"[[mechanism]]\nname = \"{name}\"\n{values}")
-    return "\n".join(lines)
+def write_book(folder, events):
+    """`book.parquet` and `trades.parquet`."""
+    changes = [event for event in events if isinstance(event, Change)]
+    trades = [event for event in events if isinstance(event, Trade)]
+    for name, rows, words in (("book", changes, ["side"]), ("trades", trades, ["aggressor"])):
+        columns = {"ts": [row.time for row in rows], "price": [round(row.price * TICK, 2) for row in rows]}
+        columns |= {"size": [float(row.size) for row in rows]}
+        columns |= {word: [getattr(row, word) for row in rows] for word in words}
+        pq.write_table(pa.table(columns), folder / f"{name}.parquet")
 
 
-def run(program, folder, bars, rule, cash, mechanisms=(), latency=None, quotes=()):
-    """The books of `sma_cross`; RUN.toml, its data and all that it writes stay in `folder`."""
+def value(of):
+    """As TOML has it."""
+    if isinstance(of, dict):
+        return "{ " + ", ".join(f"{key} = {value(item)}" for key, item in of.items()) + " }"
+    return str(of).lower() if isinstance(of, bool) else f'"{of}"' if isinstance(of, str) else repr(of)
+
+
+def section(head, values):
+    return f"{head}\n" + "".join(f"{key} = {value(item)}\n" for key, item in values.items())
+
+
+def run(program, folder, strategy, cash, *, bars=(), quotes=(), book=(), mechanisms=(), latency=None, matching=None, lot=1):
+    """The books of a run; RUN.toml, its data and all that it writes stay in `folder`.
+
+    `strategy`: the keys of `[strategy]`. Equity is that at the end of each bar, or at every event where there are none.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    write_bars(folder / "bars.parquet", bars)
+    sections = [
+        section("[run]", {"seed": 1, "cash": cash, "currency": "USD"}),
+        section("[[instrument]]", {"symbol": "XYZ", "tick_size": TICK, "lot_size": lot}),
+    ]
+    if bars:
+        write_bars(folder / "bars.parquet", bars)
+        sections.append(section("[[data]]", {"symbol": "XYZ", "bars": "bars.parquet", "stamp": "open"}))
     if quotes:
         write_quotes(folder / "quotes.parquet", quotes)
-    (folder / "run.toml").write_text(document(rule, cash, mechanisms, latency, quotes))
+        sections.append(section("[[data]]", {"symbol": "XYZ", "quotes": "quotes.parquet"}))
+    if book:
+        write_book(folder, book)
+        sections += [section("[[data]]", {"symbol": "XYZ", name: f"{name}.parquet"}) for name in ("book", "trades")]
+    sections.append(section("[strategy]", strategy))
+    sections += [section(head, keys) for head, keys in (("[latency]", latency), ("[matching]", matching)) if keys]
+    sections += [section("[[mechanism]]", {"name": name} | parameters) for name, parameters in mechanisms]
+    (folder / "run.toml").write_text("\n".join(sections))
     out = folder / "out"
     command = [str(program), "backtest", str(folder / "run.toml"), "--out", str(out), "--force"]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -65,13 +82,13 @@ def run(program, folder, bars, rule, cash, mechanisms=(), latency=None, quotes=(
 
 
 def nanos(column):
-    return column.cast(pa.timestamp("ns", tz="UTC")).cast(pa.int64()).to_pylist() if pa.types.is_timestamp(
-        column.type
-    ) else column.to_pylist()
+    if pa.types.is_timestamp(column.type):
+        column = column.cast(pa.timestamp("ns", tz="UTC")).cast(pa.int64())
+    return column.to_pylist()
 
 
 def read(out, ends):
-    """The books of a folder that `trueup backtest` wrote; of its equity, the values at `ends`."""
+    """The books of a folder that `trueup backtest` wrote; of its equity, the values at `ends`, or all."""
     orders = pq.read_table(out / "orders.parquet")
     sides = dict(zip(orders["order_id"].to_pylist(), orders["side"].to_pylist()))
     table = pq.read_table(out / "fills.parquet")
@@ -81,5 +98,5 @@ def read(out, ends):
         books.fills.append(Fill(time, sides[order], quantity, price, fee))
     equity = pq.read_table(out / "equity.parquet")
     # Of several rows of one time the last is what stands; those between the ends of bars are those of quotes.
-    books.equity = {t: e for t, e in zip(nanos(equity["ts"]), equity["equity"].to_pylist()) if t in ends}
+    books.equity = {t: e for t, e in zip(nanos(equity["ts"]), equity["equity"].to_pylist()) if not ends or t in ends}
     return books
