@@ -46,7 +46,10 @@ def quoted(mid, inventory, left, gamma, kappa, sigma, most, side):
 
 @njit
 def follow(hbt, gamma, kappa, sigma, most, size, horizon, step, fee, counted, times, equity, fills, quantities):
-    """Quotes both sides at every event of the market; the number of events seen and of fills. `fee`: of the notional."""
+    """Quotes both sides at every event of the market; `fee` is a part of the notional.
+
+    Gives the number of events seen, or the engine's error below 0, and that of fills.
+    """
     own = np.zeros(2, dtype=np.uint64)
     last_left = {np.uint64(0): 0.0}
     asked = np.uint64(0)
@@ -58,6 +61,8 @@ def follow(hbt, gamma, kappa, sigma, most, size, horizon, step, fee, counted, ti
         what = hbt.wait_next_feed(True, np.int64(60_000_000_000))
         if what == OVER:
             return seen, filled
+        if what < 0 or what > RESPONSE:
+            return -what, filled
         depth = hbt.depth(0)
         if what == RESPONSE:
             orders = hbt.orders(0).values()
@@ -129,6 +134,8 @@ def run(events, maker, cash, *, feed, order, response, queue, maker_bps=0.0, lot
     seen, filled = follow(hbt, *(maker[name] for name in names), maker_bps * 1e-4, counted, times, equity, fills, quantities)
     hbt.close()
     del rows
+    if seen < 0:
+        raise SystemExit(f"error: hftbacktest ended with its error {-seen}")
     books = Books(equity={int(t): cash + float(e) for t, e in zip(times[:seen], equity[:seen])})
     for (time, side, ticks), quantity in zip(fills[:filled], quantities.tolist()):
         price = round(int(ticks) * TICK, 2)
