@@ -9,9 +9,8 @@ use std::sync::Arc;
 use market_scene::{MINUTE, Plan, bar, bars, event, fills, limit, quantity, quotes, run_plan, settings, venue};
 use trueup::market::metric::{Costs, Counts, CurrencySummary, Metrics, RoundTrip};
 use trueup::market::{
-    Account, ActionKind, Backtest, Cash, CorporateAction, Fraction, History, Latencies, Latency, Multiplier,
-    News, OrderId, OrderKind, Orders, Price, Rate, Reason, Record, Sender, Settings, Side,
-    Status, Strategy, Terms, Ticket, View,
+    Account, ActionKind, Backtest, Cash, CorporateAction, Fraction, History, Latencies, Latency, Multiplier, News, OrderId,
+    OrderKind, Orders, Price, Rate, Reason, Record, Sender, Settings, Side, Status, Strategy, Terms, Ticket, View,
 };
 use trueup::sim2real::Timestamp;
 
