@@ -1,6 +1,5 @@
 //! What becomes of orders: it is on its way for a while, and is booked when it is known.
 
-
 use super::agenda::{Due, Phase};
 use super::backtest::BacktestError;
 use super::session::Session;

@@ -8,7 +8,7 @@ use crate::report::quantity::{UNDEFINED, fine, number, percent, with_unit};
 use crate::report::{BacktestPage, Cost, Exposure, Fall, Fill, InForce, Input, MonthReturn, Trade};
 use crate::sim2real::{Parameter, Simulator, Timestamp};
 
-use super::metric::{Drawdown, Metrics, Month, RoundTrip};
+use super::metric::{Drawdown, FillBands, Metrics, Month, RoundTrip};
 use super::run_figures::{figure_groups, key_figures};
 use super::{Backtest, Calendar, DataSeen, EquityPoint, Rate, Record, Reference, Requirement, RunSummary};
 
@@ -24,6 +24,7 @@ pub(super) fn run_page(summary: &RunSummary, backtest: &Backtest, record: &Recor
         figures: figure_groups(summary),
         time: record.equity.iter().map(|point| point.time.0).collect(),
         equity: record.equity.iter().map(|point| point.equity).collect(),
+        bands: (!record.blotter.fills.is_empty()).then(|| FillBands::curves(record)),
         months: months(summary, record),
         zone: summary.provenance.zone.name().to_owned(),
         drawdowns: summary.metrics.drawdowns.iter().map(fall).collect(),

@@ -21,6 +21,8 @@ pub struct BacktestPage {
     pub time: Vec<i64>,
     /// Equity at each of `time` [currency].
     pub equity: Vec<f64>,
+    /// The same with all fills so far at the best price of their times, and at the worst; none without a fill.
+    pub bands: Option<[Vec<f64>; 2]>,
     /// Returns month by month, in order of time; the page shows those of more than one month.
     pub months: Vec<MonthReturn>,
     /// The zone months are counted in, by its IANA name.

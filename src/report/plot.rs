@@ -27,6 +27,8 @@ pub(super) enum Ink {
     Trued,
     Equity,
     Loss,
+    /// How far a result might lie.
+    Bound,
     /// One of several things of a kind, told apart by its number.
     Member(usize),
 }
@@ -44,6 +46,7 @@ impl Ink {
             Self::Trued => "trued",
             Self::Equity => "equity",
             Self::Loss => "loss",
+            Self::Bound => "bound",
             Self::Member(k) => ["member-0", "member-1", "member-2", "member-3"][k % Self::MEMBERS],
         }
     }
@@ -53,7 +56,11 @@ impl Ink {
     }
 
     fn width(self) -> f64 {
-        if self == Self::Measured { 4.5 } else { 1.7 }
+        match self {
+            Self::Measured => 4.5,
+            Self::Bound => 1.0,
+            _ => 1.7,
+        }
     }
 
     /// Dashes tell the twins apart where colour does not.
@@ -61,6 +68,7 @@ impl Ink {
         match self {
             Self::Nominal => LineStyle::Custom("1.5 4".into()),
             Self::Recalibrated => LineStyle::Custom("7 4".into()),
+            Self::Bound => LineStyle::Custom("3 3".into()),
             _ => LineStyle::Solid,
         }
     }

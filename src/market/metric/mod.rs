@@ -4,6 +4,7 @@ mod cost;
 mod currency;
 mod daily_return;
 mod drawdown;
+mod fill_bands;
 mod moment;
 mod month;
 mod returns;
@@ -20,6 +21,7 @@ use daily_return::{DailyReturns, closes, years};
 pub use cost::Costs;
 pub use currency::{ChargeSummary, CurrencySummary};
 pub use drawdown::{Drawdown, Drawdowns};
+pub use fill_bands::FillBands;
 pub use month::Month;
 pub use returns::Returns;
 pub use round_trip::RoundTrip;
@@ -78,6 +80,8 @@ pub struct Metrics {
     pub withheld: f64,
     /// What trading cost.
     pub costs: Costs,
+    /// Equity at the end with each fill at the best and at the worst price of its time.
+    pub fill_bands: FillBands,
 }
 
 /// How many of everything there was.
@@ -193,6 +197,7 @@ impl Metrics {
             dividends,
             withheld,
             costs: Costs::of(record),
+            fill_bands: FillBands::of(record)?,
         })
     }
 }

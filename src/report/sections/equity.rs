@@ -29,18 +29,18 @@ impl Section for Equity<'_> {
             return Ok(String::new());
         }
         let DataTime { places: time, cuts } = DataTime::of(&self.page.time);
+        let line = |ink, values: &[f64]| {
+            let y = values.iter().map(|v| Some(*v)).collect();
+            Curve { ink, mark: Mark::Line, x: &time, y }
+        };
+        let bounds = self.page.bands.iter().flatten().map(|bound| line(Ink::Bound, bound));
         let equity = Plot {
             alt: "Equity over time".into(),
             x_label: String::new(),
             y_label: axis("equity", &self.page.currency),
             shades: gaps(&cuts),
             scale: Scale::Date(cuts),
-            curves: vec![Curve {
-                ink: Ink::Equity,
-                mark: Mark::Line,
-                x: &time,
-                y: self.page.equity.iter().map(|v| Some(*v)).collect(),
-            }],
+            curves: bounds.chain([line(Ink::Equity, &self.page.equity)]).collect(),
             zero: false,
             diagonal: false,
             within: None,
@@ -61,6 +61,7 @@ impl Section for Equity<'_> {
             include_str!("../templates/equity.html"),
             context! {
                 equity => Value::from_safe_string(equity.draw("equity-plot")),
+                bands => self.page.bands.is_some(),
                 drawdown => Value::from_safe_string(drawdown.draw("drawdown-plot")),
             },
         )
