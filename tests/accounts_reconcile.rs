@@ -49,10 +49,10 @@ impl Strategy for Drawn {
         let side = if self.draw(2) == 0 { Side::Buy } else { Side::Sell };
         let size = Quantity::nearest(1.0 + self.draw(300) as f64).unwrap();
         match self.draw(5) {
-            0 | 1 => drop(orders.market(instrument, side, size)),
+            0 | 1 => _ = orders.market(instrument, side, size),
             2 => {
                 let price = view.price(instrument).unwrap().to_f64() * (0.98 + 0.01 * self.draw(5) as f64);
-                drop(orders.limit(instrument, side, size, view.restable(instrument, side, price).unwrap()));
+                _ = orders.limit(instrument, side, size, view.restable(instrument, side, price).unwrap());
             }
             3 => {
                 let oldest = view.orders(instrument).first().map(|order| order.id);

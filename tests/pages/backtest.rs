@@ -42,6 +42,7 @@ pub fn backtest() -> BacktestPage {
         price: 471.25 + 0.0125 * i as f64,
         fee: 28.28,
     };
+    let bands = [1.0, -1.2].map(|each| equity.iter().enumerate().map(|(i, e)| e + each * i as f64 * 0.4).collect());
     BacktestPage {
         title:
             "sma_cross on SPY, 2 January to 20 December 2024: 6.9 % after costs, with a largest loss of 2.1 % on the way."
@@ -85,6 +86,7 @@ pub fn backtest() -> BacktestPage {
         trades: (0..50).map(|k| trade(start, k)).collect(),
         time,
         equity,
+        bands: Some(bands),
         exposures: vec![Exposure { name: "SPY".into(), unit: "shares".into(), values: position }],
         fills: (0..260).map(fill).collect(),
         fill_count: 412,
