@@ -339,8 +339,8 @@ fn a_strategy_knows_when_its_session_closes() {
 fn a_maker_is_flat_before_the_close_of_a_half_day() {
     let first = at("2024-11-29T14:30:00Z").0;
     let rows = (0..14_000).map(|k| {
-        let wave = (f64::from(k) / 300.0).sin().mul_add(1.0, 100.0);
-        let bid = (wave * 100.0).round() / 100.0;
+        let jump = f64::from((k * 7_919) % 11 - 5);
+        let bid = (10_000.0 + jump + 100.0 * (f64::from(k) / 300.0).sin()).round() / 100.0;
         (first + i64::from(k) * Timestamp::NANOS, bid, bid + 0.02)
     });
     let history = quotes(&rows.collect::<Vec<(i64, f64, f64)>>());
