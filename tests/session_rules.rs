@@ -336,7 +336,7 @@ mod command {
           hint: did you mean ./own.toml?
         ");
         insta::assert_snapshot!(refused("calendar = 'own.toml'", &OWN.replace("12:00", "25:00")), @r#"
-        error: own.toml:9:9: expected a local time, found "25:00"
+        error: own.toml:8:9: expected a local time, found "25:00"
           hint: write "09:30", from "00:00" to "24:00"
         "#);
         insta::assert_snapshot!(refused("calendar = 5", OWN), @r"
