@@ -323,10 +323,25 @@ mod command {
             assert_eq!((code, out.as_str()), (2, ""));
             err
         };
-        insta::assert_snapshot!(refused("calendar = 'nise'", OWN), @"");
-        insta::assert_snapshot!(refused("calendar = 'tokyo'", OWN), @"");
-        insta::assert_snapshot!(refused("calendar = './none.toml'", OWN), @"");
-        insta::assert_snapshot!(refused("calendar = 'own.toml'", &OWN.replace("12:00", "25:00")), @"");
-        insta::assert_snapshot!(refused("calendar = 5", OWN), @"");
+        insta::assert_snapshot!(refused("calendar = 'nise'", OWN), @r"
+        error: run.toml:11:1: there is no calendar `nise`
+          hint: did you mean `nyse`?
+        ");
+        insta::assert_snapshot!(refused("calendar = 'tokyo'", OWN), @r#"
+        error: run.toml:11:1: there is no calendar `tokyo`
+          hint: there are `nyse`, `cme_globex` and `always`; a file of your own is named by its path: "./my_exchange.toml"
+        "#);
+        insta::assert_snapshot!(refused("calendar = './none.toml'", OWN), @r"
+        error: run.toml:11:1: names the file ./none.toml, but there is no such file
+          hint: did you mean ./own.toml?
+        ");
+        insta::assert_snapshot!(refused("calendar = 'own.toml'", &OWN.replace("12:00", "25:00")), @r#"
+        error: own.toml:8:9: expected a local time, found "25:00"
+          hint: write "09:30", from "00:00" to "24:00"
+        "#);
+        insta::assert_snapshot!(refused("calendar = 5", OWN), @r"
+        error: run.toml:11:12: expected a text in quotes, found integer `5`
+          hint: write texts in quotes
+        ");
     }
 }

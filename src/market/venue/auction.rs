@@ -3,8 +3,7 @@
 //! Auctions are in no feed of quotes: what an order for the open or the close gets is approximated by prices that were known
 //! by then, and never by later ones.
 //!
-//! - **The open**: the first trade of the day where trades are known, else the best price of the first quote that does not
-//!   cross. Other orders that waited for the market to open meet that quote as if they arrived with it, and join the queues
+//! - **The open**: the first trade of the day where trades are known, else the best price of the first quote. Other orders that waited for the market to open meet that quote as if they arrived with it, and join the queues
 //!   anew.
 //! - **The close**: the last trade of the session up to the instant of its close, else the last price displayed, at which an
 //!   order crosses the spread. The official close may be printed seconds later, and differ.
@@ -42,28 +41,54 @@ struct Traded {
     size: f64,
 }
 
+/// What the data of a floor tell of its prices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Told {
+    /// What is displayed: quotes, or a book.
+    Displayed,
+    /// What is traded.
+    Traded,
+    /// Both: the first trade of a day is its opening, but what there is to take the quotes say.
+    Both,
+}
+
+/// The last price of a session.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Last {
+    /// There was none yet.
+    None,
+    /// It is displayed.
+    Displayed,
+    /// It was traded.
+    Traded(Traded),
+}
+
 /// The hours of a floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::market) struct Auctions {
     doors: Doors,
-    /// Trades are known: the first of a day is its opening.
-    by_trades: bool,
-    /// Quotes or a book are known: a trade alone does not say what there is to take.
-    displayed: bool,
+    told: Told,
     /// The opening of the day is still to come.
     to_open: bool,
-    /// A price was shown in this session.
-    shown: bool,
-    /// The last trade since this session opened.
-    last: Option<Traded>,
+    last: Last,
 }
 
 impl Auctions {
     /// Those of a floor with such data, whose market is closed yet.
     pub fn of(line: &Line<'_>) -> Self {
-        let by_trades = line.tells(RowKind::Trades);
         let displayed = [RowKind::Quotes, RowKind::Depth, RowKind::Orders].iter().any(|kind| line.tells(*kind));
-        Self { doors: Doors::Closed, by_trades, displayed, to_open: false, shown: false, last: None }
+        let told = match (displayed, line.tells(RowKind::Trades)) {
+            (true, false) => Told::Displayed,
+            (true, true) => Told::Both,
+            (false, _) => Told::Traded,
+        };
+        Self { doors: Doors::Closed, told, to_open: false, last: Last::None }
+    }
+
+    /// A session begins: what is known of its price is what is displayed, where its market was open before.
+    fn begin_session(&mut self, doors: Doors, first_of_day: bool) {
+        (self.doors, self.to_open) = (doors, first_of_day);
+        self.last = if doors == Doors::Open { Last::Displayed } else { Last::None };
     }
 }
 
@@ -89,8 +114,7 @@ impl Floor {
             auctions.doors = Doors::Open;
             return;
         }
-        (auctions.doors, auctions.shown) = (Doors::Opening, false);
-        (auctions.to_open, auctions.last) = (first_of_day, None);
+        auctions.begin_session(Doors::Opening, first_of_day);
         if !matches!(self.shown, Shown::Depth(_)) {
             self.shown = Shown::Nothing;
         }
@@ -100,7 +124,7 @@ impl Floor {
     /// A session begins where the one before it ends, as days do in a market that never closes: what waits goes on waiting.
     pub fn go_on(&mut self, first_of_day: bool) {
         if let Some(auctions) = &mut self.auctions {
-            (auctions.to_open, auctions.last) = (first_of_day, None);
+            auctions.begin_session(auctions.doors, first_of_day);
         }
     }
 
@@ -122,16 +146,16 @@ impl Floor {
     /// What the market shows has changed: if that is the first price of a session, orders that waited for it meet it.
     pub fn begin(&mut self, at: Timestamp, by_trade: bool) {
         let Some(auctions) = self.auctions else { return };
-        let (opens, to_hold) = (auctions.doors == Doors::Opening, auctions.to_open && !auctions.by_trades);
-        if auctions.doors == Doors::Closed || !(opens || to_hold) {
+        let opens = auctions.doors == Doors::Opening;
+        let holds = auctions.to_open && auctions.told == Told::Displayed && auctions.doors != Doors::Closed;
+        let tells = !by_trade || auctions.told == Told::Traded;
+        if !(opens || holds) || !tells || !self.shows_price() {
             return;
         }
-        if (by_trade && auctions.displayed) || !self.shows_price() {
-            return;
-        }
-        let to_open = auctions.to_open && !to_hold;
-        self.auctions = Some(Auctions { doors: Doors::Open, shown: true, to_open, ..auctions });
-        if to_hold {
+        let last = if auctions.last == Last::None { Last::Displayed } else { auctions.last };
+        let to_open = auctions.to_open && !holds;
+        self.auctions = Some(Auctions { doors: Doors::Open, to_open, last, ..auctions });
+        if holds {
             self.open_at(at, None);
         }
         if opens {
@@ -152,7 +176,7 @@ impl Floor {
     pub(super) fn heed_print(&mut self, price: Price, size: f64, at: Timestamp) {
         let Some(auctions) = &mut self.auctions else { return };
         let traded = Traded { price, size };
-        auctions.last = Some(traded);
+        auctions.last = Last::Traded(traded);
         if auctions.to_open && auctions.doors != Doors::Closed {
             auctions.to_open = false;
             self.open_at(at, Some(traded));
@@ -178,19 +202,17 @@ impl Floor {
 
     /// The day closes at `at`; `traded` says whether anything happened in the session that does.
     pub fn close_at(&mut self, at: Timestamp, traded: bool) {
-        let known = self.auctions.filter(|_| traded && !self.by_bars);
-        let last = known.and_then(|auctions| auctions.last);
-        let priced = known.is_some_and(|auctions| auctions.shown || last.is_some());
+        let last = self.auctions.filter(|_| traded && !self.by_bars).map_or(Last::None, |auctions| auctions.last);
         self.taken = Taken::default();
         for k in 0..self.resting.len() {
             let order = self.resting[k];
             if !is_for_close(order.kind) || order.from >= at {
                 continue;
             }
-            if priced {
-                self.take_part(k, at, last);
-            } else {
-                self.end(k, at, Reason::NoAuction);
+            match last {
+                Last::None => self.end(k, at, Reason::NoAuction),
+                Last::Displayed => self.take_part(k, at, None),
+                Last::Traded(traded) => self.take_part(k, at, Some(traded)),
             }
         }
         self.taken = Taken::default();
