@@ -9,9 +9,8 @@ use std::sync::Arc;
 use market_scene::{MINUTE, Plan, bar, bars, event, fills, limit, quantity, quotes, run_plan, settings, venue};
 use trueup::market::metric::{Costs, Counts, CurrencySummary, Metrics, RoundTrip};
 use trueup::market::{
-    Account, ActionKind, Backtest, Cash, CorporateAction, Fraction, History, Instrument, Latencies, Latency, Multiplier,
-    News, OrderId, OrderKind, Orders, Price, Quantity, Rate, Reason, Record, Requirement, Role, Sender, Settings, Side,
-    Status, Strategy, Terms, Ticket, View,
+    Account, ActionKind, Backtest, Cash, CorporateAction, Fraction, History, Latencies, Latency, Multiplier, News, OrderId,
+    OrderKind, Orders, Price, Rate, Reason, Record, Sender, Settings, Side, Status, Strategy, Terms, Ticket, View,
 };
 use trueup::sim2real::Timestamp;
 
@@ -397,6 +396,16 @@ fn a_margin_call_sends_no_order_twice() {
     let record = run(gone, &[], regulation_t(), event(0).submit(buy(0, 2_000.0)));
     assert_eq!(fills(&record).len(), 2);
     assert_eq!((record.ledger.is_flat(), record.ledger.equity().unwrap()), (true, cash(-20_000.0)));
+}
+
+/// 2,000 at 100 are 4,000 at 50, and the broker can sell all of them.
+#[test]
+fn a_margin_call_after_a_split_closes_in_new_units() {
+    let history = vec![bars(&[(100.0, 100.0), (100.0, 100.0), (50.0, 50.0), (50.0, 20.0), (20.0, 20.0), (20.0, 20.0)])];
+    let account = Account { actions: vec![split(2, 2, 1)], ..regulation_t() };
+    let record = run(history, &[], account, event(0).submit(buy(0, 2_000.0)));
+    assert_eq!(fills(&record), [(MINUTE, 2_000.0, 100.0), (4 * MINUTE, 4_000.0, 20.0)]);
+    assert_eq!((record.ledger.is_flat(), record.account.margin_calls.len()), (true, 1));
 }
 
 #[test]
