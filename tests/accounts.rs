@@ -252,6 +252,18 @@ fn a_split_changes_positions_orders_and_marks_and_no_equity() {
     assert!((trips[0].entry_price - (100.0 + 30.0 + 63.0) / 40.0).abs() < 1e-12);
 }
 
+/// The last bar before a split, which the strategy sees a second after it, is told in new units, as what is held.
+#[test]
+fn a_price_that_was_on_its_way_at_a_split_is_of_before() {
+    let history = vec![bars(&[(10.0, 10.0), (10.0, 10.0), (10.0, 10.0), (10.0, 10.0), (5.0, 5.0)])];
+    let latencies = Latencies { feed: Latency::Constant { seconds: 1.0 }, ..Latencies::default() };
+    let account = Account { actions: vec![split(4, 2, 1)], ..of(&[Terms::default()]) };
+    let settings = Settings { latencies, ..with(account) };
+    let record = run_plan(history, &[], settings, &mut event(0).submit(buy(0, 10.0)));
+    assert_eq!(fills(&record), [(2 * MINUTE, 10.0, 10.0)], "decided a second after the open of the second bar");
+    assert_eq!((equity(&record), record.ledger.positions()[0].quantity), (vec![100_000.0; 5], quantity(20.0)));
+}
+
 /// Three for seven: 10 shares are 4.28, of which 4 are whole; 2 / 7 of a new share are paid for at the old mark.
 #[test]
 fn fractions_of_a_split_are_paid_out_and_leave_the_round_trip() {
@@ -384,6 +396,16 @@ fn a_margin_call_sends_no_order_twice() {
     let record = run(gone, &[], regulation_t(), event(0).submit(buy(0, 2_000.0)));
     assert_eq!(fills(&record).len(), 2);
     assert_eq!((record.ledger.is_flat(), record.ledger.equity().unwrap()), (true, cash(-20_000.0)));
+}
+
+/// 2,000 at 100 are 4,000 at 50, and the broker can sell all of them.
+#[test]
+fn a_margin_call_after_a_split_closes_in_new_units() {
+    let history = vec![bars(&[(100.0, 100.0), (100.0, 100.0), (50.0, 50.0), (50.0, 20.0), (20.0, 20.0), (20.0, 20.0)])];
+    let account = Account { actions: vec![split(2, 2, 1)], ..regulation_t() };
+    let record = run(history, &[], account, event(0).submit(buy(0, 2_000.0)));
+    assert_eq!(fills(&record), [(MINUTE, 2_000.0, 100.0), (4 * MINUTE, 4_000.0, 20.0)]);
+    assert_eq!((record.ledger.is_flat(), record.account.margin_calls.len()), (true, 1));
 }
 
 #[test]

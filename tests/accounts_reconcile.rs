@@ -52,7 +52,7 @@ impl Strategy for Drawn {
             0 | 1 => _ = orders.market(instrument, side, size),
             2 => {
                 let price = view.price(instrument).unwrap().to_f64() * (0.98 + 0.01 * self.draw(5) as f64);
-                _ = orders.limit(instrument, side, size, view.restable(instrument, side, price).unwrap());
+                orders.limit(instrument, side, size, view.restable(instrument, side, price).unwrap());
             }
             3 => {
                 let oldest = view.orders(instrument).first().map(|order| order.id);

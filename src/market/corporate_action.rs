@@ -35,7 +35,7 @@ impl Session<'_> {
             due => Some(due),
         });
         for place in places {
-            // Reborrowed by hand: a reference to a trait object of a shorter life is no `as_deref_mut` away.
+            // `as_deref_mut` would borrow it for as long as it lives.
             let hears: Option<&mut dyn Strategy> = match &mut strategy {
                 Some(strategy) => Some(&mut **strategy),
                 None => None,

@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
 
+use super::mechanism::charge_kind;
 use super::{AnotherFill, Book, ChargeKind, DepthBook, Execution, Increments, Quantity, Side};
 
 pub use path::Intrabar;
@@ -158,15 +159,6 @@ impl Venue {
         };
         let floors = setup.symbols.iter().enumerate().map(floor).collect();
         Self { floors, conceding, charges }
-    }
-}
-
-/// What a mechanism charges for.
-fn charge_kind(mechanism: &str) -> ChargeKind {
-    match mechanism {
-        "borrow_fee" => ChargeKind::Borrow,
-        "funding" => ChargeKind::Funding,
-        _ => ChargeKind::Other,
     }
 }
 

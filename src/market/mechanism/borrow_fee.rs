@@ -1,7 +1,9 @@
 //! What it costs to be short: the fee of whoever lends the shares.
 
-use crate::market::{Execution, OrderLog, Report, Role, Side};
+use crate::market::{ChargeKind, Execution, OrderLog, Report, Role, Side};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Typical};
+
+use super::Charging;
 
 /// `fee += annual_rate * value of what is short * time held / 360 days`, charged on a position whenever the account is told of it.
 ///
@@ -40,6 +42,12 @@ impl Mechanism<Execution> for BorrowFee {
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
         Box::new(Loan { annual_rate: thetas.row(0).to_vec() })
+    }
+}
+
+impl Charging for BorrowFee {
+    fn kind(&self) -> ChargeKind {
+        ChargeKind::Borrow
     }
 }
 

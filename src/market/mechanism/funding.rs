@@ -1,7 +1,9 @@
 //! Funding: what those who are long a perpetual future pay those who are short.
 
-use crate::market::{Execution, OrderLog, Report, Role};
+use crate::market::{ChargeKind, Execution, OrderLog, Report, Role};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Typical};
+
+use super::Charging;
 
 /// `fee += side * rate * value held` for each interval: what is long pays where the rate is positive, what is short receives.
 ///
@@ -48,6 +50,12 @@ impl Mechanism<Execution> for Funding {
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
         let intervals = (form != CONTINUOUS).then(|| thetas.row(1).iter().map(|hours| hours * HOUR).collect());
         Box::new(Transfer { rate: thetas.row(0).to_vec(), intervals })
+    }
+}
+
+impl Charging for Funding {
+    fn kind(&self) -> ChargeKind {
+        ChargeKind::Funding
     }
 }
 

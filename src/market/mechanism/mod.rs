@@ -4,6 +4,7 @@
 mod adverse_selection;
 mod book_walk;
 mod borrow_fee;
+mod charging;
 mod commission;
 mod funding;
 mod half_spread;
@@ -23,6 +24,7 @@ mod volatility_slippage;
 pub use adverse_selection::AdverseSelection;
 pub use book_walk::BookWalk;
 pub use borrow_fee::BorrowFee;
+pub use charging::{Charging, charge_kind};
 pub use commission::Commission;
 pub use funding::Funding;
 pub use half_spread::HalfSpread;
@@ -58,6 +60,9 @@ pub static MECHANISMS: Registry<Execution> = &[
     &BorrowFee,
     &Funding,
 ];
+
+/// Those of the registry that charge for what is held.
+pub static CHARGING: &[&dyn Charging] = &[&BorrowFee, &Funding];
 
 /// Those of the registry that can do nothing without some data.
 pub static DEMANDING: &[&dyn Demanding] = &[

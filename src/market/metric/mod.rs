@@ -288,7 +288,6 @@ pub struct InstrumentSummary {
 
 impl InstrumentSummary {
     /// One summary an instrument.
-    #[must_use]
     ///
     /// # Errors
     /// If an amount of cash is beyond what can be held.
