@@ -182,6 +182,39 @@ fn the_price_of_an_instrument_is_a_rate_and_a_currency_without_one_is_an_error()
     );
 }
 
+#[test]
+fn an_account_that_cannot_be_is_refused() {
+    let said = |account: Account| {
+        let history = bars(&[(20.0, 20.0), (20.0, 20.0)]);
+        let made = Backtest::new(vec![market_scene::instrument("A")], vec![history], venue(&[]), with(account));
+        made.err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let known = |rows: &[(i64, f64)]| Rate::Known(rows.iter().map(|(t, price)| (Timestamp(*t), at(*price))).collect());
+    for (account, words) in [
+        (of(&[]), "there are terms for 0 of 1 instruments"),
+        (Account { currencies: Vec::new(), ..of(&[fifty()]) }, "the account has no currency"),
+        (Account { rates: vec![Rate::Constant(at(1.0))], ..of(&[fifty()]) }, "there are 1 rates for 0 foreign currencies"),
+        (of(&[Terms { currency: 1, ..fifty() }]), "A: there is no currency 1"),
+        (in_euros(Rate::Constant(at(0.0))), "the rate of EUR: currency 1 at a rate of 0"),
+        (in_euros(known(&[(5, 1.0), (9, -1.0)])), "the rate of EUR: currency 1 at a rate of -1"),
+        (in_euros(known(&[(5, 1.0), (5, 2.0)])), "the rate of EUR of 1970-01-01T00:00:00.000000005Z is not after"),
+        (in_euros(Rate::PriceOf(0)), "the rate of EUR: there is no instrument 0"),
+        (Account { actions: vec![split(1, 0, 1)], ..of(&[fifty()]) }, "a split of 0 new for 1 old"),
+        (Account { actions: vec![dividend(1, 1.0, 101)], ..of(&[fifty()]) }, "a withholding of 1.01"),
+        (
+            Account { actions: vec![CorporateAction { instrument: 3, ..split(1, 2, 1) }], ..of(&[fifty()]) },
+            "there is no instrument 3",
+        ),
+        (
+            Account { actions: vec![CorporateAction { at: Timestamp(MINUTE + 1), ..split(0, 2, 1) }], ..of(&[fifty()]) },
+            "lies within the bar from 1970-01-01T00:01:00Z",
+        ),
+    ] {
+        let found = said(account);
+        assert!(found.contains(words) && found.contains("\nhint: "), "{words}: {found}");
+    }
+}
+
 /// Ten are held before the ex-instant, ten more are bought at the open of that instant.
 #[test]
 fn a_dividend_is_paid_to_who_held_before_the_ex_instant() {
