@@ -177,10 +177,15 @@ impl Rate {
         let refuse = |error| Err(BacktestError::Account { place: format!("the rate of {name}"), error });
         match self {
             Self::Constant(rate) if rate.0 <= 0 => refuse(LedgerError::Rate { currency, rate: rate.to_f64() }),
-            Self::Known(rates) => match rates.iter().find(|(_, rate)| rate.0 <= 0) {
-                Some((_, rate)) => refuse(LedgerError::Rate { currency, rate: rate.to_f64() }),
-                None => Ok(()),
-            },
+            Self::Known(rates) => {
+                if let Some((_, rate)) = rates.iter().find(|(_, rate)| rate.0 <= 0) {
+                    return refuse(LedgerError::Rate { currency, rate: rate.to_f64() });
+                }
+                match rates.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
+                    Some(pair) => Err(BacktestError::RateOrder { currency: name.to_owned(), at: pair[1].0 }),
+                    None => Ok(()),
+                }
+            }
             Self::PriceOf(instrument) => match terms.get(*instrument) {
                 // A rate is told in the base currency.
                 Some(Terms { currency: 0, .. }) => Ok(()),

@@ -121,6 +121,14 @@ pub enum BacktestError {
         /// The currency.
         currency: String,
     },
+    /// Rates that are not in the order of time.
+    #[error("the rate of {currency} of {at} is not after the one before it\nhint: sort rates by time, one an instant")]
+    RateOrder {
+        /// The currency.
+        currency: String,
+        /// From when on the rate is in force.
+        at: Timestamp,
+    },
     /// A dividend or split within a bar, whose prices are then of before and after.
     #[error(
         "an action of {symbol} at {at} lies within the bar from {open_at} to {known_at}\nhint: the ex-instant is the open of the first bar without the dividend or after the split: check `ts` and `zone`"
