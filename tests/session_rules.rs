@@ -317,6 +317,16 @@ mod command {
     }
 
     #[test]
+    fn a_twin_has_no_calendar() {
+        let text = "[twin]\nmodel = 'execution'\n[[instrument]]\nsymbol = 'A'\ntick_size = 0.01\ncalendar = 'nyse'\n";
+        let error = trueup::io::TwinFile::parse(trueup::io::Document::from_text("twin.toml", text)).unwrap_err().to_string();
+        insta::assert_snapshot!(error, @r"
+        twin.toml:6:1: a twin has no use for a calendar
+          hint: leave it out: a recording says itself when orders were filled
+        ");
+    }
+
+    #[test]
     fn a_calendar_that_is_none_is_refused_at_its_place() {
         let refused = |calendar: &str, own: &str| {
             let (code, out, err) = ran(calendar, own, "backtest run.toml");

@@ -71,8 +71,9 @@ fn day_order_ends(calendar: &str, sent: &str) -> Timestamp {
     let later = at(sent) + 20 * 24 * 60 * MINUTE;
     let history = quotes(&[(at(sent).0, 99.0, 101.0), (later.0, 99.0, 101.0)]);
     let (_, plan) = run_in(calendar, history, event(0).submit(far().working(TimeInForce::Day)));
-    let [(ended, Reason::TimeInForce)] = ended(&plan)[..] else { panic!("{:?}", plan.notices) };
-    ended
+    let ended = ended(&plan);
+    assert_eq!(ended.iter().map(|(_, reason)| *reason).collect::<Vec<_>>(), [Reason::TimeInForce], "{calendar} {sent}");
+    ended[0].0
 }
 
 #[test]

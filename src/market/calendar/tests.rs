@@ -159,6 +159,9 @@ fn a_lunch_break_is_two_sessions_and_a_half_day_has_the_first() {
     let monday: Vec<_> = calendar.sessions_on(date(2024, 12, 23)).map(utc).collect();
     assert_eq!(monday[0], ("2024-12-23T01:30:00Z".into(), "2024-12-23T04:00:00Z".into()));
     assert_eq!(monday[1].0, "2024-12-23T05:00:00Z");
+    let day = |d| calendar.day(date(2024, 12, d)).map(utc);
+    assert_eq!(day(23), Some(("2024-12-23T01:30:00Z".into(), "2024-12-23T08:00:00Z".into())), "both, and the break");
+    assert_eq!((day(24).map(|day| day.1), day(25)), (Some("2024-12-24T04:00:00Z".into()), None));
     assert_eq!(calendar.sessions_on(date(2024, 12, 24)).count(), 1);
     assert_eq!(calendar.sessions_on(date(2025, 1, 6)).count(), 1);
 }
@@ -266,7 +269,9 @@ proptest! {
             let edges = session.into_iter().chain(next).flat_map(|hours| [hours.open, hours.close]);
             for time in edges.flat_map(|edge| [edge + -1, edge, edge + 1]).chain([time]) {
                 let (session, next) = (calendar.session_at(time), calendar.next_session(time));
+                prop_assert_eq!(trading.seen_at(time), session);
                 prop_assert_eq!(trading.is_open(time), session.is_some());
+                prop_assert_eq!(trading.seen_at(time), session);
                 prop_assert_eq!(trading.session_at(time), session);
                 prop_assert_eq!(trading.next_session(time), next);
                 let closed = calendar.previous_close(time);
