@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// What a room may see of the crate: the start of a path, so that `sim2real` allows all of it, `sim2real::Seed` that alone.
 const LAYERS: &[(&str, &[&str])] = &[
     ("sim2real", &[]),
-    ("conceal", &["sim2real::Seed"]),
+    ("conceal", &["sim2real::Seed", "sim2real::Draws"]),
     ("io", &["sim2real"]),
     ("report", &["sim2real"]),
     ("rl", &["sim2real"]),
