@@ -213,6 +213,12 @@ impl History {
         &self.prints
     }
 
+    /// When each of its trades could be known; nothing where that is when they happened.
+    #[inline(always)]
+    pub(super) fn prints_known(&self) -> &[Timestamp] {
+        &self.prints_known
+    }
+
     /// Its changes of the book, in the order in which they were known.
     #[must_use]
     pub fn depth(&self) -> &[DepthChange] {

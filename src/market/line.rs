@@ -95,8 +95,33 @@ pub(super) struct Line<'d> {
 
 #[derive(Debug)]
 enum Data<'d> {
-    Whole(&'d History),
+    Whole(&'d History, Rows<'d>),
     Part(Box<Part>),
+}
+
+/// Rows at hand, each a step away.
+#[derive(Debug, Clone, Copy)]
+struct Rows<'a> {
+    bars: &'a [Bar],
+    quotes: &'a Quotes,
+    prints: &'a [Print],
+    prints_known: &'a [Timestamp],
+    depth: &'a [DepthChange],
+    order_events: &'a [OrderEvent],
+}
+
+impl<'a> Rows<'a> {
+    #[inline(always)]
+    fn of(history: &'a History) -> Self {
+        Self {
+            bars: history.bars(),
+            quotes: history.quotes(),
+            prints: history.prints(),
+            prints_known: history.prints_known(),
+            depth: history.depth(),
+            order_events: history.order_events(),
+        }
+    }
 }
 
 /// What is at hand of streams.
@@ -113,7 +138,7 @@ impl<'d> Line<'d> {
     pub fn whole(history: &'d History) -> Self {
         let kinds = RowKind::ALL.map(|kind| count(history, kind) > 0);
         let (first, limit) = ([0; RowKind::COUNT], [usize::MAX; RowKind::COUNT]);
-        Self { data: Data::Whole(history), kinds, first, limit }
+        Self { data: Data::Whole(history, Rows::of(history)), kinds, first, limit }
     }
 
     /// What streams give; the first rows of each are read at once.
@@ -132,7 +157,7 @@ impl<'d> Line<'d> {
     /// The same once more, where its data are in memory as a whole: streams give their rows once.
     pub fn forked(&self) -> Option<Self> {
         match self.data {
-            Data::Whole(history) => Some(Self { data: Data::Whole(history), ..*self }),
+            Data::Whole(history, rows) => Some(Self { data: Data::Whole(history, rows), ..*self }),
             Data::Part(_) => None,
         }
     }
@@ -141,7 +166,7 @@ impl<'d> Line<'d> {
     #[cfg(feature = "io")]
     pub fn into_at_hand(self) -> History {
         match self.data {
-            Data::Whole(history) => history.clone(),
+            Data::Whole(history, _) => history.clone(),
             Data::Part(part) => part.at_hand,
         }
     }
@@ -154,7 +179,7 @@ impl<'d> Line<'d> {
     /// Number of all rows, where they are in memory.
     pub fn rows(&self) -> Option<usize> {
         match &self.data {
-            Data::Whole(history) => Some(history.rows()),
+            Data::Whole(history, _) => Some(history.rows()),
             Data::Part(_) => None,
         }
     }
@@ -162,16 +187,16 @@ impl<'d> Line<'d> {
     /// What was found in the data as far as they were read.
     pub fn notes(&self) -> Vec<DataNotes> {
         match &self.data {
-            Data::Whole(history) => history.notes().to_vec(),
+            Data::Whole(history, _) => history.notes().to_vec(),
             Data::Part(part) => part.sources.notes(),
         }
     }
 
     #[inline(always)]
-    fn at_hand(&self) -> &History {
+    fn at_hand(&self) -> Rows<'_> {
         match &self.data {
-            Data::Whole(history) => history,
-            Data::Part(part) => &part.at_hand,
+            Data::Whole(_, rows) => *rows,
+            Data::Part(part) => Rows::of(&part.at_hand),
         }
     }
 
@@ -184,13 +209,13 @@ impl<'d> Line<'d> {
     /// Bar `row`.
     #[inline(always)]
     pub fn bar(&self, row: usize) -> Option<&Bar> {
-        self.at_hand().bars().get(self.place(RowKind::Bars, row))
+        self.at_hand().bars.get(self.place(RowKind::Bars, row))
     }
 
     /// The quotes at hand, and the place of quote `row` among them.
     #[inline(always)]
     pub fn quotes(&self, row: usize) -> (&Quotes, usize) {
-        (self.at_hand().quotes(), self.place(RowKind::Quotes, row))
+        (self.at_hand().quotes, self.place(RowKind::Quotes, row))
     }
 
     /// Quote `row`.
@@ -203,21 +228,21 @@ impl<'d> Line<'d> {
     /// Trade `row`.
     #[inline(always)]
     pub fn print(&self, row: usize) -> Option<&Print> {
-        self.at_hand().prints().get(self.place(RowKind::Trades, row))
+        self.at_hand().prints.get(self.place(RowKind::Trades, row))
     }
 
     /// Changes of the book.
     #[inline(always)]
     pub fn depth(&self, rows: Range<usize>) -> &[DepthChange] {
         let kind = RowKind::Depth;
-        self.at_hand().depth().get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
+        self.at_hand().depth.get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
     }
 
     /// Events of resting orders.
     #[inline(always)]
     pub fn order_events(&self, rows: Range<usize>) -> &[OrderEvent] {
         let kind = RowKind::Orders;
-        self.at_hand().order_events().get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
+        self.at_hand().order_events.get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
     }
 
     /// When a row happens, at the exchange: a bar when it is over. [`Timestamp::MAX`] beyond the last.
@@ -225,11 +250,11 @@ impl<'d> Line<'d> {
     pub fn time(&self, kind: RowKind, row: usize) -> Timestamp {
         let (data, at) = (self.at_hand(), self.place(kind, row));
         let time = match kind {
-            RowKind::Bars => data.bars().get(at).map(|bar| bar.known_at),
-            RowKind::Quotes => data.quotes().times().get(at).copied(),
-            RowKind::Trades => data.prints().get(at).map(|print| print.time),
-            RowKind::Depth => data.depth().get(at).map(|change| change.time),
-            RowKind::Orders => data.order_events().get(at).map(|event| event.time),
+            RowKind::Bars => data.bars.get(at).map(|bar| bar.known_at),
+            RowKind::Quotes => data.quotes.times().get(at).copied(),
+            RowKind::Trades => data.prints.get(at).map(|print| print.time),
+            RowKind::Depth => data.depth.get(at).map(|change| change.time),
+            RowKind::Orders => data.order_events.get(at).map(|event| event.time),
         };
         time.unwrap_or(Timestamp::MAX)
     }
@@ -239,9 +264,9 @@ impl<'d> Line<'d> {
     pub fn known_at(&self, kind: RowKind, row: usize) -> Timestamp {
         let (data, at) = (self.at_hand(), self.place(kind, row));
         let known_at = match kind {
-            RowKind::Trades => data.print_known_at(at),
-            RowKind::Depth => data.depth().get(at).map(|change| change.known_at),
-            RowKind::Orders => data.order_events().get(at).map(|event| event.known_at),
+            RowKind::Trades => data.prints_known.get(at).copied().or(data.prints.get(at).map(|print| print.time)),
+            RowKind::Depth => data.depth.get(at).map(|change| change.known_at),
+            RowKind::Orders => data.order_events.get(at).map(|event| event.known_at),
             RowKind::Bars | RowKind::Quotes => return self.time(kind, row),
         };
         known_at.unwrap_or(Timestamp::MAX)
@@ -253,8 +278,8 @@ impl<'d> Line<'d> {
     pub fn batch(&self, kind: RowKind, row: usize) -> usize {
         let (data, at) = (self.at_hand(), self.place(kind, row));
         match kind {
-            RowKind::Depth => row + same(data.depth(), at, |change| change.time),
-            RowKind::Orders => row + same(data.order_events(), at, |event| event.time),
+            RowKind::Depth => row + same(data.depth, at, |change| change.time),
+            RowKind::Orders => row + same(data.order_events, at, |event| event.time),
             RowKind::Bars | RowKind::Quotes | RowKind::Trades => row + 1,
         }
     }

@@ -16,7 +16,7 @@ impl<T> Default for Past<T> {
 
 impl<T: Copy> Past<T> {
     /// Takes in a row, of which the newest `keep` stay for certain.
-    #[inline]
+    #[inline(always)]
     pub fn push(&mut self, row: T, keep: usize) {
         if self.rows.len() >= room(keep) {
             self.rows.drain(..self.rows.len() - (keep - 1));
