@@ -5,9 +5,9 @@ mod market_scene;
 
 use std::collections::BTreeMap;
 
-use market_scene::{MINUTE, bar, bars, fills, instrument, quotes, settings, venue};
+use market_scene::{MINUTE, bar, bars, fills, instrument, of, quotes, settings, venue};
 use proptest::prelude::*;
-use trueup::market::metric::{Costs, Counts, Metrics};
+use trueup::market::metric::{Costs, Counts, FillBands, Metrics};
 use trueup::market::{
     Backtest, Bar, Cash, History, Instrument, Orders, Quantity, Quotes, Reason, Record, Reference, Settings, Side, Status,
     Strategy, View, check_strategy,
@@ -76,6 +76,21 @@ fn an_order_meets_the_next_open_and_never_the_close_it_was_decided_on() {
     let fill = record.blotter.fills[0];
     assert_eq!((fill.cost.timing, fill.cost.spread_and_impact, fill.cost.rounding), (5.0, 0.0, 0.0));
     assert_eq!(record.ledger.equity().unwrap().to_f64(), 100_000.0 + 5.0 * (17.0 - 12.0));
+}
+
+#[test]
+fn a_result_hangs_on_the_prices_of_its_fills_no_more_than_its_bars_are_wide() {
+    let history =
+        of(&[[100.0; 4], [101.0, 103.0, 100.5, 102.0], [102.0, 102.0, 102.0, 102.0], [104.0, 105.0, 101.0, 104.0]]);
+    let record = run(history, &[], &[(0, 0, Side::Buy, 10.0), (2, 0, Side::Sell, 4.0)]);
+    assert_eq!(fills(&record), [(MINUTE, 10.0, 101.0), (3 * MINUTE, 4.0, 104.0)]);
+    let FillBands { optimistic, expected, pessimistic } = FillBands::of(&record).unwrap();
+    // Bought at 101 where 100.5 to 103 was paid, sold at 104 where 101 to 105 was.
+    let gains = [optimistic - expected, expected - pessimistic].map(|gain| (gain * 100.0).round() / 100.0);
+    assert_eq!(gains, [10.0 * 0.5 + 4.0 * 1.0, 10.0 * 2.0 + 4.0 * 3.0]);
+    let [best, worst] = FillBands::curves(&record);
+    let of_each = |k: usize| [best[k] - record.equity[k].equity, record.equity[k].equity - worst[k]].map(f64::round);
+    assert_eq!((0..4).map(of_each).collect::<Vec<_>>(), [[0.0, 0.0], [5.0, 20.0], [5.0, 20.0], [9.0, 32.0]]);
 }
 
 #[test]

@@ -68,7 +68,10 @@ impl Run {
         let mut text = match &beside {
             _ if self.json => outputs.json()?,
             None => told(&outputs, screen),
-            Some(beside) => told_beside(&shown(beside)?, &outputs, screen),
+            Some(beside) => {
+                let told = told_beside(&shown(beside)?, &outputs, screen);
+                format!("{}\n\n{told}", screen.wrapped("", &self.turn.instead_of_what()))
+            }
         };
         match &self.out {
             Some(folder) => {

@@ -103,6 +103,13 @@ impl Turn {
         Ok(Ran::Whole { record: fork, beside: Some(record) })
     }
 
+    /// What is another in the fork, in a sentence.
+    pub fn instead_of_what(&self) -> String {
+        let (order, price) = (self.fork.unwrap_or_default(), self.fill_price.unwrap_or_default());
+        let units = self.fill_quantity.map_or_else(|| "all that is left".to_owned(), |units| units.to_string());
+        format!("In the fork, order {order} is filled at {price} ({units}); from there on the strategy decides anew.")
+    }
+
     fn instead(&self, file: &RunFile) -> Result<AnotherFill, InputError> {
         let wrong = |error: MoneyError| InputError::new(file.document().path(), error.to_string());
         let price = Price::nearest(self.fill_price.unwrap_or_default()).map_err(wrong)?;

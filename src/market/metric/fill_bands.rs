@@ -38,8 +38,10 @@ impl FillBands {
     pub fn curves(record: &Record) -> [Vec<f64>; 2] {
         let mut fills = record.blotter.fills.iter().peekable();
         let (mut best, mut worst) = (0.0, 0.0);
-        let points = record.equity.iter().map(|point| {
-            while let Some(fill) = fills.next_if(|fill| fill.filled_at <= point.time) {
+        let last = record.equity.len().saturating_sub(1);
+        let points = record.equity.iter().enumerate().map(|(k, point)| {
+            // What is filled at an instant is not in the equity of that instant yet, but in the last.
+            while let Some(fill) = fills.next_if(|fill| fill.filled_at < point.time || k == last) {
                 let [more, less] = spread_of(record, fill);
                 (best, worst) = (best + more, worst + less);
             }
