@@ -90,6 +90,21 @@ fn a_run_on_other_data_does_not_go_on_from_a_checkpoint() {
     assert_eq!(session.check(&checkpoint), Err(ForkError::Ended { events: 30, found: 20 }));
 }
 
+/// What is under way is part of the moment, though the account knows nothing of it yet.
+#[test]
+fn a_moment_is_another_where_another_order_works() {
+    let history = || bars(&[(100.0, 101.0), (101.0, 102.0), (102.0, 103.0)]);
+    let at = |plan: market_scene::Plan| {
+        let backtest = Backtest::new(vec![instrument("A")], vec![history()], venue(&[]), settings()).unwrap();
+        let (mut session, mut plan) = (backtest.start(), plan);
+        session.run_to(Moment::Events(2), &mut plan).unwrap();
+        session.checkpoint()
+    };
+    let far = |price: f64| event(0).submit(limit(Side::Buy, 1.0, price));
+    assert_eq!(at(far(50.0)), at(far(50.0)));
+    assert!(at(far(50.0)).state != at(far(51.0)).state && at(far(50.0)).state != at(event(9)).state);
+}
+
 #[test]
 fn a_run_stops_before_a_time_and_when_an_order_was_sent() {
     let history = bars(&[(100.0, 101.0), (101.0, 102.0), (102.0, 103.0), (103.0, 104.0)]);

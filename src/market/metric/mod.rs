@@ -1,7 +1,7 @@
 //! What a backtest came to, in figures. A figure that is not defined for a run is none, never NaN or infinity.
 
 mod cost;
-mod currency;
+mod currency_summary;
 mod daily_return;
 mod drawdown;
 mod fill_bands;
@@ -19,7 +19,7 @@ use super::{Fill, Held, Income, Instrument, MoneyError, Position, Price, Record,
 use daily_return::{DailyReturns, closes, years};
 
 pub use cost::Costs;
-pub use currency::{ChargeSummary, CurrencySummary};
+pub use currency_summary::{ChargeSummary, CurrencySummary};
 pub use drawdown::{Drawdown, Drawdowns};
 pub use fill_bands::FillBands;
 pub use month::Month;
