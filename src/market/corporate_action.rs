@@ -115,10 +115,10 @@ impl Session<'_> {
         let held = self.ledger.positions()[instrument].quantity;
         let mut kept = self.venue.floors[instrument].split(ratio, held, at);
         let on_their_way: Vec<OrderId> =
-            self.sent.iter().filter(|(_, (of, _))| *of == instrument).map(|(id, _)| *id).collect();
+            self.sent.iter().filter(|(_, (of, _))| *of == instrument).map(|(id, _)| id).collect();
         for id in on_their_way {
             // It may have gone with an order that it waited for.
-            let Some((_, order)) = self.sent.get_mut(&id) else { continue };
+            let Some((_, order)) = self.sent.get_mut(id) else { continue };
             if order.split(ratio, increments) {
                 kept.push(*order);
             } else {

@@ -56,10 +56,10 @@ impl Session<'_> {
         }
         let linked = match ticket.link {
             Link::Alone => true,
-            Link::ChildOf { parent } => self.sent.get(&parent).is_some_and(|(k, _)| *k == ticket.instrument),
+            Link::ChildOf { parent } => self.sent.get(parent).is_some_and(|(k, _)| *k == ticket.instrument),
             // The first of a group is there before the others.
             Link::OneCancelsOther { group } => {
-                let others = || self.sent.values().filter(|(_, order)| order.link == ticket.link);
+                let others = || self.sent.iter().map(|(_, sent)| sent).filter(|(_, order)| order.link == ticket.link);
                 (group == id || others().count() > 0) && others().all(|(k, _)| *k == ticket.instrument)
             }
         };
@@ -203,32 +203,32 @@ impl Session<'_> {
 
     /// An order arrives, with all that were sent with it.
     fn arrive(&mut self, id: OrderId, at: Timestamp) -> Option<usize> {
-        let (instrument, first) = self.sent.get(&id).copied()?;
-        let together = |other: &Resting| {
-            other.id == id
-                || other.link == (Link::ChildOf { parent: id })
-                || (other.link == first.link && matches!(first.link, Link::OneCancelsOther { .. }))
-        };
-        let ids: Vec<OrderId> = self.sent.values().filter(|(_, other)| together(other)).map(|(_, other)| other.id).collect();
-        let orders: Vec<Resting> = ids.iter().filter_map(|id| self.sent.remove(id)).map(|(_, order)| order).collect();
-        let orders = orders.into_iter().map(|order| order.arriving(at)).collect();
+        let (instrument, first) = self.sent.remove(id)?;
+        let in_group = matches!(first.link, Link::OneCancelsOther { .. });
+        let others =
+            self.taken_along(|other| other.link == (Link::ChildOf { parent: id }) || (in_group && other.link == first.link));
         self.keep_hours(instrument, at);
-        self.venue.floors[instrument].arrive(orders, at);
+        let all = std::iter::once(first).chain(others).map(|order| order.arriving(at));
+        self.venue.floors[instrument].arrive(all, at);
         self.expect_open(instrument);
         self.expect_close(instrument, at);
         Some(instrument)
     }
 
+    /// Takes those off the way that go with an order.
+    fn taken_along(&mut self, goes: impl Fn(&Resting) -> bool) -> Vec<Resting> {
+        let ids: Vec<OrderId> = self.sent.iter().filter(|(_, (_, order))| goes(order)).map(|(id, _)| id).collect();
+        ids.into_iter().filter_map(|id| self.sent.remove(id)).map(|(_, order)| order).collect()
+    }
+
     /// An order is taken back, wherever it is.
     pub(super) fn withdraw(&mut self, id: OrderId, at: Timestamp, reason: Reason) -> Option<usize> {
-        if let Some((instrument, order)) = self.sent.remove(&id) {
+        if let Some((instrument, order)) = self.sent.remove(id) {
             // It was on its way still; what waited for it waits in vain.
-            let children: Vec<OrderId> =
-                self.sent.values().filter(|(_, o)| o.link == (Link::ChildOf { parent: id })).map(|(_, o)| o.id).collect();
+            let children = self.taken_along(|other| other.link == (Link::ChildOf { parent: id }));
             self.pend(Outcome { id: order.id, instrument, at, what: What::Ended(reason) }, &[]);
             for child in children {
-                self.sent.remove(&child);
-                self.pend(Outcome { id: child, instrument, at, what: What::Ended(Reason::Linked) }, &[]);
+                self.pend(Outcome { id: child.id, instrument, at, what: What::Ended(Reason::Linked) }, &[]);
             }
             return None;
         }

@@ -10,6 +10,7 @@ mod bar;
 mod blotter;
 mod book;
 mod booking;
+mod by_id;
 mod calendar;
 mod carry;
 mod check;

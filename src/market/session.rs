@@ -1,6 +1,5 @@
 //! A backtest under way: feed, strategy, venue and ledger, one event at a time.
 
-use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::sim2real::Timestamp;
@@ -9,6 +8,7 @@ use super::account::Keeping;
 use super::agenda::{Agenda, Due, Phase};
 use super::backtest::{Backtest, BacktestError, Held, Record, Settings};
 use super::blotter::Blotter;
+use super::by_id::ById;
 use super::carry::Carry;
 use super::equity_curve::EquityCurve;
 use super::hours::Timetable;
@@ -18,7 +18,7 @@ use super::line::{Line, RowKind};
 use super::mail::Mail;
 use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
-use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, OrderId, Orders, Reference, Strategy};
+use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, Orders, Reference, Strategy};
 
 mod exchange;
 mod telling;
@@ -41,7 +41,7 @@ pub struct Session<'d> {
     /// What kind of data the orders of each instrument meet.
     pub(super) data_of: Vec<EventKind>,
     /// Orders on their way to the venue.
-    pub(super) sent: BTreeMap<OrderId, (usize, Resting)>,
+    pub(super) sent: ById<(usize, Resting)>,
     /// What became of orders and is not known yet.
     pub(super) mail: Mail,
     pub(super) outcomes: Vec<Outcome>,
@@ -130,7 +130,7 @@ impl<'d> Session<'d> {
             blotter: Blotter { conceding: venue.conceding.clone(), ..Blotter::default() },
             venue,
             data_of,
-            sent: BTreeMap::new(),
+            sent: ById::default(),
             mail: Mail::new(conceding),
             outcomes: Vec::new(),
             terms: Vec::new(),

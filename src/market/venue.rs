@@ -164,7 +164,7 @@ impl Venue {
 
 impl Floor {
     /// Orders that were sent together arrive.
-    pub fn arrive(&mut self, orders: Vec<Resting>, at: Timestamp) {
+    pub fn arrive(&mut self, orders: impl Iterator<Item = Resting>, at: Timestamp) {
         let first = self.resting.len();
         self.resting.extend(orders);
         let open = self.is_open();

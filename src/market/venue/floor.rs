@@ -307,6 +307,13 @@ impl Floor {
 
     /// Clears away the orders that are over, and what children wait for that their parents never fill.
     pub(super) fn sweep(&mut self, at: Timestamp) {
+        if self.resting.iter().any(|order| matches!(order.link, Link::ChildOf { .. })) {
+            self.sweep_children(at);
+        }
+        self.resting.retain(|order| order.left > Quantity::ZERO);
+    }
+
+    fn sweep_children(&mut self, at: Timestamp) {
         let alive: Vec<OrderId> = self.resting.iter().filter(|o| o.left > Quantity::ZERO).map(|o| o.id).collect();
         for k in 0..self.resting.len() {
             let order = &mut self.resting[k];
@@ -320,7 +327,6 @@ impl Floor {
                 }
             }
         }
-        self.resting.retain(|order| order.left > Quantity::ZERO);
     }
 
     /// Takes an order back as its owner asked, if it is still there.
