@@ -91,6 +91,10 @@ fn honest(diagnosis: &Diagnosis, overflows: bool) -> Result<(), TestCaseError> {
         prop_assert!(known.is_finite() && effect.rivals.iter().all(|r| (0.0..=1.0).contains(&r.confidence)), "{effect:?}");
         prop_assert!(effect.parameters.values().all(|p| p.value.is_finite()), "{effect:?}");
     }
+    for fit in &diagnosis.fit {
+        let [low, high] = fit.improvement_ci95;
+        prop_assert!(low <= high && high <= 1.0, "{fit:?}");
+    }
     prop_assert!(diagnosis.parameters.values().all(|p| p.value.is_finite()), "{:?}", diagnosis.parameters);
     prop_assert!(
         !diagnosis.summary.is_empty() && !["NaN", "inf "].iter().any(|w| diagnosis.summary.contains(w)),
@@ -103,6 +107,22 @@ fn honest(diagnosis: &Diagnosis, overflows: bool) -> Result<(), TestCaseError> {
         prop_assert_eq!(read.map(|d| d.verdict).map_err(|e| format!("{e}: {written}")), Ok(diagnosis.verdict));
     }
     Ok(())
+}
+
+/// The random case in which what was found ran away on held-out data, so that nothing could be said of how much it helps.
+#[test]
+fn what_runs_away_on_held_out_data_helps_less_than_anything() {
+    let twin = Assembly::new(Joint::new(Axis::Rotary, [0.1, -30.0, 2.0, 1.0], [0.2, 0.2, 0.2, 0.1]), MECHANISMS);
+    let (commands, samples) = (
+        Signal::Steps(2.449_315_945_511_510_3, 739_594_159_844_898_838),
+        Signal::Steps(6.906_936_388_566_288, 7_591_308_859_643_756_258),
+    );
+    let fitted = [recording(&commands, &samples, 59, 0.0, true)];
+    let outcome = diagnose(&twin, &fitted, &[], Seed(1), &|_, _, _| ());
+    honest(&outcome.diagnosis, false).unwrap();
+    for fit in &outcome.diagnosis.fit {
+        assert!(fit.trued_rmse.is_finite() || fit.improvement_ci95 == [f64::NEG_INFINITY; 2], "{fit:?}");
+    }
 }
 
 /// The random case in which a twin that ran away was told of as an error of NaN.

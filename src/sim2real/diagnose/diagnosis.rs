@@ -230,13 +230,20 @@ pub struct ChannelFit {
     /// Mean absolute error of the twin with what was found added.
     #[serde(deserialize_with = "without_bound")]
     pub trued_mae: f64,
-    /// By what part the trued twin's RMSE lies below the recalibrated twin's: 95 % interval, block bootstrap.
+    /// By what part the trued twin's RMSE lies below the recalibrated twin's: 95 % interval, block bootstrap; minus infinity
+    /// (`null` in a file) where the trued twin alone diverges.
+    #[serde(deserialize_with = "below_all_bounds")]
     pub improvement_ci95: [f64; 2],
 }
 
 /// A number, or infinity where a file has none.
 fn without_bound<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::INFINITY))
+}
+
+/// Two numbers, each minus infinity where a file has none.
+fn below_all_bounds<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 2], D::Error> {
+    Ok(<[Option<f64>; 2]>::deserialize(from)?.map(|end| end.unwrap_or(f64::NEG_INFINITY)))
 }
 
 /// What speaks for and against a verdict.

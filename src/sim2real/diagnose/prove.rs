@@ -128,6 +128,13 @@ fn improvement(recalibrated: &[f64], trued: &[f64], seed: Seed) -> [f64; 2] {
             .collect()
     };
     let (before, after) = (cumulated(recalibrated), cumulated(trued));
+    // A run that leaves all bounds is better or worse without measure.
+    match [&before, &after].map(|sums| sums.last().is_some_and(|sum| sum.is_finite())) {
+        [true, true] => {}
+        [true, false] => return [f64::NEG_INFINITY; 2],
+        [false, true] => return [1.0; 2],
+        [false, false] => return [0.0; 2],
+    }
     let mut draws: Vec<f64> = (0..DRAWS)
         .map(|_| {
             let (mut a, mut b) = (0.0, 0.0);
