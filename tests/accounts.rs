@@ -2,50 +2,17 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails where a value is missing")]
 
+mod account_scene;
 mod market_scene;
 
-use std::sync::Arc;
-
-use market_scene::{MINUTE, Plan, bar, bars, event, fills, limit, quantity, quotes, run_plan, settings, venue};
+use account_scene::{at, buy, cash, minute, of, run, sell, split, with};
+use market_scene::{MINUTE, Plan, bar, bars, event, fills, limit, quantity, quotes, run_plan, venue};
 use trueup::market::metric::{Costs, Counts, CurrencySummary, Metrics, RoundTrip};
 use trueup::market::{
     Account, ActionKind, Backtest, Cash, CorporateAction, Fraction, History, Latencies, Latency, Multiplier, News,
-    OrderKind, Orders, Price, Rate, Reason, Record, Settings, Side, Status, Strategy, Terms, Ticket, View,
+    OrderKind, Orders, Rate, Reason, Record, Settings, Side, Status, Strategy, Terms, View,
 };
 use trueup::sim2real::Timestamp;
-
-fn cash(value: f64) -> Cash {
-    Cash::nearest(value).unwrap()
-}
-
-fn at(price: f64) -> Price {
-    Price::nearest(price).unwrap()
-}
-
-fn minute(k: i64) -> Timestamp {
-    Timestamp(k * MINUTE)
-}
-
-fn buy(instrument: usize, units: f64) -> Ticket {
-    Ticket::market(instrument, Side::Buy, quantity(units))
-}
-
-fn sell(instrument: usize, units: f64) -> Ticket {
-    Ticket::market(instrument, Side::Sell, quantity(units))
-}
-
-/// An account in US dollars, of instruments with these terms.
-fn of(terms: &[Terms]) -> Account {
-    Account { currencies: vec!["USD".into()], terms: terms.to_vec(), ..Account::default() }
-}
-
-fn with(account: Account) -> Settings {
-    Settings { account: Some(Arc::new(account)), ..settings() }
-}
-
-fn run(histories: Vec<History>, parts: &[(&str, &str, f64)], account: Account, plan: Plan) -> Record {
-    run_plan(histories, parts, with(account), &mut plan.clone())
-}
 
 fn fifty() -> Terms {
     Terms { multiplier: Multiplier::new(50).unwrap(), ..Terms::default() }
@@ -63,10 +30,6 @@ fn nanos(amount: f64) -> f64 {
 fn dividend(minutes: i64, per_unit: f64, percent: u8) -> CorporateAction {
     let kind = ActionKind::Dividend { per_unit: at(per_unit), withholding: Fraction::percent(percent) };
     CorporateAction { at: minute(minutes), instrument: 0, kind }
-}
-
-fn split(minutes: i64, new: u32, old: u32) -> CorporateAction {
-    CorporateAction { at: minute(minutes), instrument: 0, kind: ActionKind::Split { new, old } }
 }
 
 // Bars of open and close, a minute each: what is decided on bar k meets the open of bar k + 1.

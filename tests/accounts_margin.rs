@@ -2,49 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+mod account_scene;
 mod market_scene;
 
-use std::sync::Arc;
-
-use market_scene::{MINUTE, Plan, bars, event, fills, limit, quantity, quotes, run_plan, settings};
+use account_scene::{buy, cash, minute, of, run, sell, split, with};
+use market_scene::{MINUTE, bars, event, fills, limit, quantity, quotes, run_plan};
 use trueup::market::metric::Counts;
-use trueup::market::{
-    Account, ActionKind, Cash, CorporateAction, Fraction, History, Latencies, Latency, OrderId, Reason, Record, Sender,
-    Settings, Side, Status, Terms, Ticket,
-};
+use trueup::market::{Account, Cash, Fraction, Latencies, Latency, OrderId, Reason, Sender, Settings, Side, Status, Terms};
 use trueup::sim2real::Timestamp;
-
-fn cash(value: f64) -> Cash {
-    Cash::nearest(value).unwrap()
-}
-
-fn minute(k: i64) -> Timestamp {
-    Timestamp(k * MINUTE)
-}
-
-fn buy(instrument: usize, units: f64) -> Ticket {
-    Ticket::market(instrument, Side::Buy, quantity(units))
-}
-
-fn sell(instrument: usize, units: f64) -> Ticket {
-    Ticket::market(instrument, Side::Sell, quantity(units))
-}
-
-fn of(terms: &[Terms]) -> Account {
-    Account { currencies: vec!["USD".into()], terms: terms.to_vec(), ..Account::default() }
-}
-
-fn with(account: Account) -> Settings {
-    Settings { account: Some(Arc::new(account)), ..settings() }
-}
-
-fn run(histories: Vec<History>, parts: &[(&str, &str, f64)], account: Account, plan: Plan) -> Record {
-    run_plan(histories, parts, with(account), &mut plan.clone())
-}
-
-fn split(minutes: i64, new: u32, old: u32) -> CorporateAction {
-    CorporateAction { at: minute(minutes), instrument: 0, kind: ActionKind::Split { new, old } }
-}
 
 fn regulation_t() -> Account {
     of(&[Terms::default().with_regulation_t()])

@@ -90,7 +90,7 @@ impl Write for Digested {
     }
 }
 
-impl<'d> Session<'d> {
+impl Session<'_> {
     /// The moment it is at.
     #[must_use]
     pub fn checkpoint(&self) -> Checkpoint {
@@ -104,13 +104,6 @@ impl<'d> Session<'d> {
             text
         });
         Checkpoint { events: self.events(), time: self.equity.end().map(|time| time.0), state }
-    }
-
-    /// A second run that goes on from here by itself, with a [copy](Strategy::copied) of the strategy; none where data are
-    /// streamed, which give their rows once.
-    #[must_use]
-    pub fn fork(&self) -> Option<Self> {
-        self.copied()
     }
 
     /// Whether it has come to `moment`.

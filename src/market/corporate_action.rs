@@ -7,7 +7,7 @@ use super::agenda::{Due, Phase};
 use super::backtest::BacktestError;
 use super::session::Session;
 use super::venue::Resting;
-use super::{Arrival, Dividend, Event, EventKind, LedgerError, MoneyError, OrderId, Reason, Split, Strategy};
+use super::{Arrival, Bar, Dividend, Event, EventKind, LedgerError, MoneyError, OrderId, Reason, Split, Strategy};
 
 impl Session<'_> {
     /// The ex-instant of an action has come. What became of orders of its instrument before is known to their owner now
@@ -20,8 +20,7 @@ impl Session<'_> {
     ) -> Result<(), BacktestError> {
         let Some(action) = self.keeping.as_ref().map(|keeping| keeping.account.actions[number]) else { return Ok(()) };
         // Of streams nobody knew it before.
-        let row = self.feed.next_bar(action.instrument);
-        if let Some(bar) = row.and_then(|row| self.feed.line(action.instrument).bar(row)).filter(|bar| bar.open_at < at) {
+        if let Some(bar) = self.bar_to_come(action.instrument).filter(|bar| bar.open_at < at) {
             let symbol = self.setup.instruments[action.instrument].symbol.clone();
             return Err(BacktestError::WithinBar { symbol, at, open_at: bar.open_at, known_at: bar.known_at });
         }
@@ -52,9 +51,12 @@ impl Session<'_> {
     #[cold]
     fn a_bar_of_that_instant_ends(&self, at: Timestamp) -> bool {
         let (Some(Due::Action(number)), Some(keeping)) = (self.agenda.next_due(), &self.keeping) else { return false };
-        let instrument = keeping.account.actions[number].instrument;
-        let row = self.feed.next_bar(instrument);
-        row.and_then(|row| self.setup.histories[instrument].bars().get(row)).is_some_and(|bar| bar.known_at == at)
+        self.bar_to_come(keeping.account.actions[number].instrument).is_some_and(|bar| bar.known_at == at)
+    }
+
+    /// The next bar of an instrument, which is not over yet.
+    fn bar_to_come(&self, instrument: usize) -> Option<&Bar> {
+        self.feed.line(instrument).bar(self.next_bar(instrument)?)
     }
 
     /// Whether what is due has to wait for a bar that ends at its instant, which is of the time before an action.

@@ -33,8 +33,9 @@ pub struct PreparedRun {
 ///
 /// # Errors
 /// Data of kinds no backtest runs on, instruments without data, data outside `start` and `end`; a `price` the data do not
-/// have; calendars that are not there or none; mechanisms, keys, units or values the registry does not know, or that need data there are none of; and what
-/// [`History::read_bars`] and [`History::read_quotes`] refuse.
+/// have; calendars that are not there or are none; mechanisms, keys, units or values the registry does not know, or that need
+/// data there are none of; files of rates or actions that cannot be; and what [`History::read_bars`] and
+/// [`History::read_quotes`] refuse.
 pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     // What needs no data is said before they are read.
     venue(run)?;

@@ -156,13 +156,15 @@ impl<'d> Session<'d> {
         self.held.events
     }
 
-    /// When the strategy sees the next event, or something else happens; none when the data have ended.
+    /// When the next row of data happens or is shown; none when the data have ended.
     pub(super) fn next_time(&self) -> Option<Timestamp> {
         self.feed.peek().into_iter().chain(self.transit.peek()).min()
     }
 
-    /// The same once more, where its data are in memory.
-    pub(super) fn copied(&self) -> Option<Self> {
+    /// A second run that goes on from here by itself, with a [copy](Strategy::copied) of the strategy; none where data are
+    /// streamed, which give their rows once.
+    #[must_use]
+    pub fn fork(&self) -> Option<Self> {
         Some(Self {
             setup: self.setup,
             feed: self.feed.forked()?,

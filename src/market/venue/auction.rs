@@ -3,8 +3,8 @@
 //! Auctions are in no feed of quotes: what an order for the open or the close gets is approximated by prices that were known
 //! by then, and never by later ones.
 //!
-//! - **The open**: the first trade of the day where trades are known, else the best price of the first quote. Other orders that waited for the market to open meet that quote as if they arrived with it, and join the queues
-//!   anew.
+//! - **The open**: the first trade of the day where trades are known, else the best price of the first quote. Other orders that
+//!   waited for the market to open meet that quote as if they arrived with it, and join the queues anew.
 //! - **The close**: the last trade of the session up to the instant of its close, else the last price displayed, at which an
 //!   order crosses the spread. The official close may be printed seconds later, and differ.
 //!
