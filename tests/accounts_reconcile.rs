@@ -4,6 +4,7 @@
 
 mod account_scene;
 mod market_scene;
+mod ways_scene;
 
 use account_scene::{at, minute, with};
 use market_scene::{MINUTE, bars, venue};
@@ -11,11 +12,13 @@ use proptest::prelude::{ProptestConfig, any, proptest};
 use trueup::market::metric::RoundTrip;
 use trueup::market::{
     Account, ActionKind, Backtest, Cash, CorporateAction, Fraction, Instrument, Multiplier, OrderKind, Orders, Price,
-    Quantity, Rate, Reason, Record, Requirement, Role, Sender, Side, Sources, Stored, Strategy, Terms, View,
+    Quantity, Rate, Reason, Record, Requirement, Role, Sender, Side, Strategy, Terms, View,
 };
 use trueup::sim2real::Timestamp;
+use ways_scene::same_every_way;
 
 /// Asks for whatever it draws.
+#[derive(Clone)]
 struct Drawn(u64);
 
 impl Drawn {
@@ -103,22 +106,6 @@ fn drawn_market(seed: u64) -> Backtest {
     Backtest::new(instruments, histories, venue(&parts), with(account)).unwrap()
 }
 
-/// Holds a run whose bars come from streams, a few at a time, to be `record`.
-fn same_on_streams(backtest: &Backtest, record: &Record, seed: u64) {
-    let (instruments, venue, settings) =
-        (backtest.instruments().to_vec(), backtest.venue().clone(), backtest.settings().clone());
-    let streaming = Backtest::streaming(instruments, venue, settings).unwrap();
-    let sources = backtest.histories().iter().map(|history| {
-        let bars = Stored::new(history.bars().to_vec(), 1 + seed as usize % 7).unwrap();
-        Sources { bars: Some(Box::new(bars)), ..Sources::default() }
-    });
-    let (mut session, mut drawn) = (streaming.start_on(sources.collect()).unwrap(), Drawn(seed ^ 0x5bd1_e995));
-    while session.step(&mut drawn).unwrap().is_some() {}
-    let streamed = session.finish().unwrap();
-    assert_eq!((&streamed.blotter, &streamed.equity), (&record.blotter, &record.equity));
-    assert_eq!((&streamed.ledger, &streamed.account), (&record.ledger, &record.account));
-}
-
 /// Cash of each currency by its fills, dividends and splits alone.
 fn cash_by_hand(record: &Record) -> Vec<i128> {
     let ledger = &record.ledger;
@@ -168,7 +155,7 @@ proptest! {
         assert_eq!(record.equity.last().unwrap().equity, ledger.equity().unwrap().to_f64());
         let again = drawn_market(seed).run(&mut Drawn(seed ^ 0x5bd1_e995)).unwrap();
         assert_eq!(record, again);
-        same_on_streams(&backtest, &record, seed);
+        same_every_way(&backtest, &record, &Drawn(seed ^ 0x5bd1_e995), 1 + seed as usize % 7);
         for order in &record.blotter.orders {
             assert!(order.filled <= order.quantity && (order.sender == Sender::Strategy || order.kind == OrderKind::Market));
         }

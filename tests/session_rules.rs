@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 mod market_scene;
+mod ways_scene;
 
 use std::sync::Arc;
 
@@ -15,6 +16,7 @@ use trueup::market::{
     audit,
 };
 use trueup::sim2real::{Seed, Timestamp};
+use ways_scene::same_every_way;
 
 /// Monday, 2024-07-01T00:00:00Z.
 const MONDAY: i64 = 1_719_792_000 * Timestamp::NANOS;
@@ -24,6 +26,7 @@ fn price(cents: i64) -> Price {
 }
 
 /// Asks for an order of any kind at most events, by a generator of its own.
+#[derive(Clone)]
 struct Busy(u64);
 
 impl Busy {
@@ -210,6 +213,7 @@ proptest! {
             prop_assert_eq!(&record.outside, &vec![Some(outside)]);
         }
         prop_assert_eq!(&record, &backtest.run(&mut Busy(seed)).unwrap());
+        same_every_way(&backtest, &record, &Busy(seed), 1 + seed as usize % 7);
     }
 
     /// What comes after an instant changes nothing before it: no auction is filled from later prices.

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 mod market_scene;
+mod ways_scene;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -10,10 +11,11 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use market_scene::{Busy, MINUTE, instrument, settings, venue, whole_bar};
 use proptest::prelude::*;
 use trueup::market::{
-    Backtest, BacktestError, Bar, Book, Dated, DepthAction, DepthChange, History, HistoryError, Known, Latencies, Latency,
-    Level, OrderAction, OrderEvent, Price, Print, Quotes, Record, Settings, Side, Sources, Stored, Stream, StreamError,
+    Backtest, BacktestError, Bar, Book, DepthAction, DepthChange, History, HistoryError, Known, Latencies, Latency, Level,
+    OrderAction, OrderEvent, Price, Print, Quotes, Record, Settings, Side, Sources, Stream, StreamError,
 };
 use trueup::sim2real::{Seed, Timestamp};
+use ways_scene::same_every_way;
 
 /// All data of one instrument.
 #[derive(Debug, Clone, Default)]
@@ -37,20 +39,6 @@ impl Rows {
             .and_then(|h| h.with_depth(self.depth.clone()))
             .and_then(|h| h.with_order_events(self.orders.clone()))
             .unwrap()
-    }
-
-    fn sources(&self, at_a_time: usize) -> Sources {
-        fn stream<T: Dated + Clone + Send + 'static>(rows: &[T], at_a_time: usize) -> Option<Box<dyn Stream<T>>> {
-            let stored = Stored::new(rows.to_vec(), at_a_time).unwrap();
-            (!rows.is_empty()).then(|| Box::new(stored) as Box<dyn Stream<T>>)
-        }
-        Sources {
-            bars: stream(&self.bars, at_a_time),
-            quotes: stream(&self.quotes, at_a_time),
-            trades: stream(&self.prints, at_a_time),
-            depth: stream(&self.depth, at_a_time),
-            order_events: stream(&self.orders, at_a_time),
-        }
     }
 }
 
@@ -116,12 +104,6 @@ fn of_latency(seconds: f64) -> Settings {
     Settings { seed: Seed(4), latencies: Latencies { feed, order, ..Latencies::default() }, ..settings() }
 }
 
-/// What was recorded, but for what is said of the data.
-fn same(one: &Record, other: &Record) -> bool {
-    let Record { blotter, equity, ledger, held, .. } = one;
-    (blotter, equity, ledger, held) == (&other.blotter, &other.equity, &other.ledger, &other.held)
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 160, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -135,21 +117,19 @@ proptest! {
         let all: Vec<Rows> = kinds.iter().zip(drawn).map(|(kinds, drawn)| rows(*kinds, drawn)).collect();
         let instruments: Vec<_> = ["A", "B"][..all.len()].iter().map(|symbol| instrument(symbol)).collect();
         let parts = [("half_spread", "bps", 1.0)];
-        let whole = Backtest::new(instruments.clone(), all.iter().map(Rows::history).collect(), venue(&parts), of_latency(seconds));
-        let streaming = Backtest::streaming(instruments, venue(&parts), of_latency(seconds)).unwrap();
-        let started = streaming.start_on(all.iter().map(|rows| rows.sources(at_a_time)).collect());
-        match whole {
-            Err(error) => prop_assert_eq!(started.err(), Some(error), "no data"),
-            Ok(whole) => {
-                let (mut session, mut busy) = (started.unwrap(), Busy::default());
-                while session.step(&mut busy).unwrap().is_some() {}
-                let (record, mut other) = (session.finish().unwrap(), Busy::default());
-                let expected = whole.run(&mut other).unwrap();
-                prop_assert_eq!((busy.events, busy.seen), (other.events, other.seen), "what was seen");
-                prop_assert!(same(&record, &expected), "{:#?}\n{:#?}", record.blotter, expected.blotter);
-            }
+        let whole = Backtest::new(instruments, all.iter().map(Rows::history).collect(), venue(&parts), of_latency(seconds));
+        if let Ok(whole) = whole {
+            let record = whole.run(&mut Busy::default()).unwrap();
+            same_every_way(&whole, &record, &Busy::default(), at_a_time);
         }
     }
+}
+
+#[test]
+fn there_must_be_data_and_as_many_streams_as_instruments() {
+    let backtest = Backtest::streaming(vec![instrument("A")], venue(&[]), settings()).unwrap();
+    assert_eq!(backtest.start_on(vec![Sources::default()]).err(), Some(BacktestError::NoData));
+    assert_eq!(backtest.start_on(Vec::new()).err(), Some(BacktestError::Unmatched { instruments: 1, histories: 0 }));
 }
 
 /// Bars made as they are asked for, some at a time; it counts those that are given.
