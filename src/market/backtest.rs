@@ -5,7 +5,8 @@ use std::sync::Arc;
 use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
-use super::line::{Line, RowKind};
+use super::line::Line;
+use super::sources::RowKind;
 use super::{
     Account, AccountRecord, Calendar, Cash, DataNotes, Execution, Feed, History, Increments, Instrument, Latencies,
     LatencyError, Ledger, LedgerError, Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy, StreamError,
@@ -369,7 +370,7 @@ impl Backtest {
     /// If an amount overflows, or a mechanism gives a price no market has.
     pub fn run(&self, strategy: &mut dyn Strategy) -> Result<Record, BacktestError> {
         let mut session = self.start();
-        while session.step(strategy)?.is_some() {}
+        while session.advance(strategy, usize::MAX)? {}
         session.finish()
     }
 }

@@ -70,6 +70,7 @@ mod run_page;
 #[cfg(feature = "io")]
 mod run_stream;
 mod session;
+mod sources;
 mod strategy;
 mod stream;
 #[cfg(feature = "io")]
@@ -114,7 +115,6 @@ pub use ledger::{
     Balance, ChargeKind, Charges, Closing, Conversion, Dividend, Fraction, Income, Ledger, LedgerError, Margin, Multiplier,
     Position, Requirement, Split, Terms, Trade,
 };
-pub use line::Sources;
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
 #[cfg(feature = "io")]
 pub use log_folder::{LogSettings, read_log};
@@ -133,6 +133,7 @@ pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
 #[cfg(feature = "io")]
 pub use run_stream::prepare_streaming_run;
 pub use session::Session;
+pub use sources::Sources;
 pub use strategy::{Event, EventKind, News, Notice, Orders, Strategy, View};
 #[cfg(feature = "io")]
 pub use stream::FileStream;

@@ -14,13 +14,15 @@ use super::equity_curve::EquityCurve;
 use super::hours::Timetable;
 use super::known::Known;
 use super::latency::Clocks;
-use super::line::{Line, RowKind};
+use super::line::Line;
 use super::mail::Mail;
+use super::sources::RowKind;
 use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, Orders, Reference, Strategy};
 
 mod exchange;
+mod quiet;
 mod telling;
 
 /// A backtest under way.
@@ -32,6 +34,8 @@ pub struct Session<'d> {
     trades_mark: Vec<bool>,
     /// Data take no time to the strategy but what their own two times say.
     direct: bool,
+    /// Nothing but bars and orders wants to be looked for.
+    can_be_quiet: bool,
     pub(super) agenda: Agenda,
     pub(super) clocks: Clocks,
     pub(super) timetable: Timetable<'d>,
@@ -115,7 +119,7 @@ impl<'d> Session<'d> {
         }
         let mut agenda = Agenda::default();
         let (ledger, keeping) = Keeping::start(&setup.settings, count, origin, &mut agenda);
-        Self {
+        let mut session = Self {
             setup,
             equity: EquityCurve::new(equity_every, feed.rows()),
             feed,
@@ -123,6 +127,7 @@ impl<'d> Session<'d> {
             transit: Transit::new(count),
             agenda,
             direct: latencies.feed.is_none(),
+            can_be_quiet: false,
             clocks: Clocks::new(latencies, seed),
             timetable,
             known,
@@ -141,7 +146,9 @@ impl<'d> Session<'d> {
             orders: Orders::default(),
             held: Held::default(),
             rows: 0,
-        }
+        };
+        session.can_be_quiet = session.may_be_quiet();
+        session
     }
 
     /// Rows of data read, and rows in all, where all are in memory.
@@ -171,6 +178,7 @@ impl<'d> Session<'d> {
             transit: self.transit.clone(),
             trades_mark: self.trades_mark.clone(),
             direct: self.direct,
+            can_be_quiet: self.can_be_quiet,
             agenda: self.agenda.clone(),
             clocks: self.clocks.clone(),
             timetable: self.timetable.clone(),
@@ -227,8 +235,9 @@ impl<'d> Session<'d> {
                 }
                 self.transit.put(self.clocks.shown(arrival.known_at), arrival);
             } else if let Some((at, arrival)) = self.transit.pop() {
-                let arrival = Arrival { event: Event { time: at, ..arrival.event }, ..arrival };
-                return self.show(&arrival, strategy).map(Some);
+                return self
+                    .show_late(&Arrival { event: Event { time: at, ..arrival.event }, ..arrival }, strategy)
+                    .map(Some);
             }
         }
     }
@@ -277,7 +286,9 @@ impl<'d> Session<'d> {
         self.feed.read_on(oldest.saturating_sub(1)).map_err(|error| BacktestError::Data(Box::new(error)))
     }
 
-    /// What is due next happens: the event it makes for the strategy, if it asked to be woken.
+    /// What is due next happens: the event it makes for the strategy, if it asked to be woken. Apart from the loop, which turns
+    /// faster without what few events need.
+    #[inline(never)]
     fn act(&mut self, strategy: Option<&mut dyn Strategy>) -> Result<Option<Event>, BacktestError> {
         let Some((at, due)) = self.agenda.pop() else { return Ok(None) };
         if self.keeping.is_some() {

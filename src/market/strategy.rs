@@ -116,6 +116,7 @@ impl<'a> View<'a> {
     }
 
     /// The best price displayed on `side` (bids: [`Side::Buy`]), by the book or else the last quote.
+    #[inline]
     #[must_use]
     pub fn best(&self, instrument: usize, side: Side) -> Option<Price> {
         let known = self.known.get(instrument)?;
@@ -161,6 +162,7 @@ impl<'a> View<'a> {
     }
 
     /// Our orders of an instrument that work, as far as is known, the oldest first.
+    #[inline]
     #[must_use]
     pub fn orders(&self, instrument: usize) -> &'a [OpenOrder] {
         self.known.get(instrument).map_or(&[], |known| &known.orders)

@@ -13,7 +13,8 @@
 //!
 //! Source: NYSE rules 7.35A (core open) and 7.35B (closing auction), for what is approximated.
 
-use crate::market::line::{Line, RowKind};
+use crate::market::line::Line;
+use crate::market::sources::RowKind;
 use crate::market::{Book, OrderKind, Price, Quantity, Reason, Side, TimeInForce};
 use crate::sim2real::Timestamp;
 

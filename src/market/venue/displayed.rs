@@ -18,7 +18,7 @@ impl Floor {
         if order.tradable() <= Quantity::ZERO {
             return;
         }
-        let Some(touch) = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok()) else {
+        let Some(touch) = self.shown.touch_price(order.side) else {
             // Nothing to take: what cannot wait is over, the rest waits.
             return self.wait_or_end(k, at);
         };
@@ -65,7 +65,7 @@ impl Floor {
 
     /// Best price an order of `side` can take, and what is displayed there.
     fn best_taken(&self, side: Side) -> Option<(Price, f64)> {
-        let touch = Price::nearest(self.shown.touch(side)?).ok()?;
+        let touch = self.shown.touch_price(side)?;
         Some((touch, self.shown.displayed_at(side.opposite(), touch)))
     }
 
@@ -127,17 +127,13 @@ impl Floor {
         let Shown::Depth(book) = &mut self.shown else { return };
         if !self.resting.is_empty() {
             for order in &mut self.resting {
+                // A snapshot says anew what is there; until it does, nothing is known to have gone.
                 if order.side == change.side
-                    && let OrderKind::Limit { price } = order.kind
+                    && order.kind == (OrderKind::Limit { price: change.price })
+                    && change.action == DepthAction::Set
                 {
-                    let was = book.size(order.side, price);
-                    match change.action {
-                        DepthAction::Set if price == change.price => {
-                            order.place.displayed(self.rules.queue, was, change.size);
-                        }
-                        // A snapshot says anew what is there; until it does, nothing is known to have gone.
-                        _ => {}
-                    }
+                    let was = book.size(order.side, change.price);
+                    order.place.displayed(self.rules.queue, was, change.size);
                 }
             }
         }
@@ -159,12 +155,25 @@ impl Floor {
         if self.resting.is_empty() || !self.is_open() {
             return;
         }
+        let (to_buy, to_sell) = (self.shown.touch_price(Side::Buy), self.shown.touch_price(Side::Sell));
         for k in 0..self.resting.len() {
+            let order = &self.resting[k];
+            let touch = if order.side == Side::Buy { to_buy } else { to_sell };
+            // What rests behind the touch, as nearly all does, has nothing to do with it.
+            if let OrderKind::Limit { price } = order.kind
+                && touch.is_none_or(|touch| !order.side.accepts(touch, price))
+            {
+                continue;
+            }
             self.look_at(k, at);
         }
-        self.sweep(at);
+        // What is over has been told.
+        if !self.is_quiet() {
+            self.sweep(at);
+        }
     }
 
+    /// Order `k` meets what is shown, which reaches its limit if it has one.
     fn look_at(&mut self, k: usize, at: Timestamp) {
         let order = self.resting[k];
         if order.tradable() <= Quantity::ZERO {
@@ -172,12 +181,7 @@ impl Floor {
         }
         match order.kind {
             OrderKind::Limit { price } => {
-                let crossed = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok());
-                let Some(offer) =
-                    crossed.filter(|touch| order.side.accepts(*touch, price)).and_then(|_| self.offer_at(price, at))
-                else {
-                    return;
-                };
+                let Some(offer) = self.offer_at(price, at) else { return };
                 // What we took ourselves is shown on; nobody new is there.
                 if self.taken.by(order.side) > 0.0 && self.takable(&order) <= 0.0 {
                     return;
@@ -253,7 +257,7 @@ impl Floor {
 
     /// The best price an order of `side` can take, which sets a stop of that side off.
     pub(super) fn touch_price(&self, side: Side) -> Option<Price> {
-        self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok())
+        self.shown.touch_price(side)
     }
 
     /// What an order of `side` can take now.
@@ -283,7 +287,7 @@ impl Floor {
     /// Lowest and highest price displayed on the inside.
     fn band(&self, mid: f64) -> [Price; 2] {
         let mid = Price::nearest(mid).unwrap_or_default();
-        let of = |side| self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok()).unwrap_or(mid);
+        let of = |side| self.shown.touch_price(side).unwrap_or(mid);
         [of(Side::Sell).min(mid), of(Side::Buy).max(mid)]
     }
 
