@@ -144,8 +144,8 @@ impl PaperStatus {
             | "accepted_for_bidding"
             | "pending_update" => Self::Open,
             "filled" | "closed" => Self::Filled,
-            "cancelled" | "canceled" | "done_for_day" | "stopped" => Self::Cancelled,
-            "rejected" | "denied" | "failed" | "suspended" => Self::Rejected,
+            "cancelled" | "canceled" => Self::Cancelled,
+            "rejected" | "denied" | "failed" => Self::Rejected,
             "expired" | "expired_in_match" => Self::Expired,
             "replaced" => Self::Replaced,
             _ => Self::Other(word),
@@ -206,6 +206,43 @@ pub struct PaperOrder {
     pub seen_ask: Option<Price>,
     /// Where it stands in the source.
     pub place: SourcePlace,
+}
+
+impl PaperOrder {
+    /// An order of which no more is known.
+    #[must_use]
+    pub fn new(id: &str, symbol: &str, side: Side, place: SourcePlace) -> Self {
+        Self {
+            id: id.to_owned(),
+            client_id: None,
+            symbol: symbol.to_owned(),
+            side,
+            quantity: None,
+            kind: None,
+            limit_price: None,
+            stop_price: None,
+            time_in_force: None,
+            decided_at: None,
+            submitted_at: None,
+            ended_at: None,
+            status: None,
+            filled: None,
+            average_price: None,
+            replaced_by: None,
+            parent: None,
+            strategy: None,
+            tag: None,
+            seen_bid: None,
+            seen_ask: None,
+            place,
+        }
+    }
+
+    /// The first time that is known of it.
+    #[must_use]
+    pub fn first_time(&self) -> Option<Timestamp> {
+        self.decided_at.or(self.submitted_at).or(self.ended_at)
+    }
 }
 
 /// As what a fill met the market.
@@ -293,6 +330,28 @@ pub struct PaperFill {
     pub origin: FillOrigin,
     /// Where it stands in the source.
     pub place: SourcePlace,
+}
+
+impl PaperFill {
+    /// A fill of which no more is known.
+    #[must_use]
+    pub fn new(symbol: &str, filled_at: Timestamp, quantity: Quantity, price: Price, place: SourcePlace) -> Self {
+        Self {
+            id: None,
+            order_id: None,
+            symbol: symbol.to_owned(),
+            side: None,
+            filled_at,
+            quantity,
+            price,
+            currency: None,
+            fee: None,
+            charged: None,
+            liquidity: None,
+            origin: FillOrigin::Execution,
+            place,
+        }
+    }
 }
 
 /// A log: orders in the order of their times, fills in the order of theirs, and what was odd.

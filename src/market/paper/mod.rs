@@ -5,7 +5,11 @@ mod finding;
 #[cfg(feature = "io")]
 pub mod import;
 mod log;
+#[cfg(feature = "io")]
+mod tables;
 
 pub use clock::{PaperClock, TimeColumn, TimeMeaning, resolution};
 pub use finding::{FindingKind, FindingSummary, PaperFinding, PaperFindings, SourcePlace};
 pub use log::{Charge, FillOrigin, Liquidity, OrderWords, PaperFill, PaperLog, PaperOrder, PaperStatus};
+#[cfg(feature = "io")]
+pub use tables::PaperSummary;
