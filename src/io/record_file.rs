@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(read("b.csv", "x,y\n"), Ok(vec![0]));
         assert_eq!(read("a.log", " [{\"x\": 1}]"), Ok(vec![1]));
         assert_eq!(read("a.json", "\u{feff}{\"x\": 1}\n{\"x\": 2}"), Ok(vec![2]));
-        assert_eq!(read("a", "<R><T a=\"1\"/></R>"), Ok(vec![1, 1]));
+        assert_eq!(read("a", "<R><T a=\"1\"/></R>"), Ok(vec![1]));
         let error = read("a.txt", "x 1").unwrap_err().to_string();
         assert!(error.contains("hint: a log is a table"), "{error}");
         assert_eq!(record_files(folder.path()).unwrap().len(), 5);

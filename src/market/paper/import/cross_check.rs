@@ -1,6 +1,6 @@
 //! What only the whole log shows: rows that are there twice, fills without orders, sums that differ, times that go backwards.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::super::{
     FillOrigin, FindingKind, PaperFill, PaperFinding, PaperFindings, PaperLog, PaperOrder, PaperStatus, SourcePlace,
@@ -59,7 +59,7 @@ fn single_orders(orders: Vec<PaperOrder>, findings: &mut PaperFindings) -> Vec<P
 fn single_fills(fills: Vec<PaperFill>, findings: &mut PaperFindings) -> Vec<PaperFill> {
     let order_of = |fill: &PaperFill| Some(key(&fill.symbol, fill.order_id.as_deref()?));
     let executions = fills.iter().filter(|fill| fill.origin == FillOrigin::Execution);
-    let executed: std::collections::HashSet<Key> = executions.filter_map(order_of).collect();
+    let executed: HashSet<Key> = executions.filter_map(order_of).collect();
     let mut single: Vec<PaperFill> = Vec::with_capacity(fills.len());
     let mut numbers: HashMap<(Key, Option<String>, FillOrigin), usize> = HashMap::new();
     for fill in fills {
@@ -146,7 +146,7 @@ fn check_sum(order: &PaperOrder, sum: Quantity, findings: &mut PaperFindings) {
 
 /// Holds each order to itself and to those it names.
 fn check_orders(orders: &[PaperOrder], findings: &mut PaperFindings) {
-    let ids: std::collections::HashSet<&str> = orders.iter().map(|order| order.id.as_str()).collect();
+    let ids: HashSet<&str> = orders.iter().map(|order| order.id.as_str()).collect();
     for order in orders {
         let mut note = |kind, message: String| findings.add(PaperFinding::at(kind, order.place.clone(), message));
         if let Some(by) = &order.replaced_by {

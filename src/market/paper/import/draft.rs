@@ -1,5 +1,7 @@
 //! A log while it is read: what readers add, row by row.
 
+use std::collections::HashMap;
+
 use super::super::{
     FillOrigin, FindingKind, PaperClock, PaperFill, PaperFinding, PaperLog, PaperOrder, SourcePlace, TimeColumn, TimeMeaning,
 };
@@ -81,8 +83,7 @@ impl Entries {
     }
 }
 
-/// Makes orders of what executions say of theirs: side, kind, when they were made. How much was ordered is not known of them.
-/// `stated` gives what a fill's row says of its order.
+/// The order of an execution, as far as that tells: its side, and that so much of it was filled. How much was ordered it does not.
 pub(super) fn order_of_fill(fill: &PaperFill) -> Option<PaperOrder> {
     let mut order = PaperOrder::new(fill.order_id.as_deref()?, &fill.symbol, fill.side?, fill.place.clone());
     order.filled = Some(fill.quantity);
@@ -92,7 +93,7 @@ pub(super) fn order_of_fill(fill: &PaperFill) -> Option<PaperOrder> {
 /// Joins the orders that executions state, one an execution, into one an order: what was filled adds up, the first time counts.
 pub(super) fn join_orders(orders: Vec<PaperOrder>) -> Vec<PaperOrder> {
     let mut joined: Vec<PaperOrder> = Vec::new();
-    let mut numbers = std::collections::HashMap::new();
+    let mut numbers = HashMap::new();
     for order in orders {
         let key = (order.symbol.clone(), order.id.clone());
         match numbers.get(&key).copied().and_then(|at: usize| joined.get_mut(at)) {

@@ -3,7 +3,7 @@
 //! Source: `hummingbot/model/order.py`, `order_status.py`, `trade_fill.py`, `decimal_type_decorator.py` and
 //! `hummingbot/core/data_type/trade_fee.py`.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::super::{FindingKind, OrderWords, PaperFill, PaperOrder, PaperStatus, TimeColumn, TimeMeaning};
@@ -79,7 +79,7 @@ fn read(tables: &[&Records], draft: &mut Draft<'_>) -> Result<(), InputError> {
 
 /// Adds the orders that only their fills tell of.
 fn of_fills(draft: &mut Draft<'_>, stated: Vec<PaperOrder>) {
-    let known: std::collections::HashSet<String> = draft.log.orders.iter().map(|order| order.id.clone()).collect();
+    let known: HashSet<String> = draft.log.orders.iter().map(|order| order.id.clone()).collect();
     let stated = join_orders(stated.into_iter().filter(|order| !known.contains(&order.id)).collect());
     if !stated.is_empty() {
         draft.clock(TimeColumn::DecidedAt, "timestamp less age", TimeMeaning::Submitted);

@@ -2,13 +2,16 @@
 //!
 //! Source: Interactive Brokers, *Flex Query reference*, sections *Trades* and *Trade Confirmations*.
 
-use super::super::{FindingKind, OrderWords, PaperFill, PaperOrder, PaperStatus, TimeColumn, TimeMeaning};
+use std::collections::HashSet;
+
+use super::super::{FindingKind, OrderWords, PaperFill, PaperFinding, PaperOrder, PaperStatus, TimeColumn, TimeMeaning};
 use super::draft::{Draft, Entries, join_orders, order_of_fill};
 use super::row::{Row, side_of};
 use super::stamp::Written;
 use super::{Format, Stop};
 use crate::io::{InputError, Records};
-use crate::market::{Cash, Quantity};
+use crate::market::{Cash, Quantity, Side};
+use crate::sim2real::Timestamp;
 
 pub(super) static FORMAT: Format = Format {
     id: "ibkr_flex",
@@ -50,8 +53,11 @@ fn read(tables: &[&Records], draft: &mut Draft<'_>) -> Result<(), InputError> {
         })?;
     }
     take_back(draft, busts);
+    if !draft.log.orders.is_empty() {
+        draft.note(FindingKind::Note, "rows of orders state what was filled of them, not how much was ordered");
+    }
     // Orders of which there are executions only are what these say of them.
-    let known: std::collections::HashSet<String> = draft.log.orders.iter().map(|order| order.id.clone()).collect();
+    let known: HashSet<String> = draft.log.orders.iter().map(|order| order.id.clone()).collect();
     let of_executions = join_orders(stated.into_iter().filter(|order| !known.contains(&order.id)).collect());
     if !of_executions.is_empty() {
         let message =
@@ -104,7 +110,7 @@ fn multiplier(row: &mut Row<'_>) {
     }
 }
 
-fn side(row: &Row<'_>) -> Result<crate::market::Side, Stop> {
+fn side(row: &Row<'_>) -> Result<Side, Stop> {
     let word = row.need("buySell")?.trim_end_matches("(Ca.)");
     side_of(word).ok_or_else(|| row.unread("buySell", "expected BUY or SELL"))
 }
@@ -124,7 +130,6 @@ fn order(row: &mut Row<'_>, entries: &mut Entries) -> Result<(), Stop> {
     if let Some(fill) = entries.total(&order, currency.as_deref()) {
         fee(row, fill)?;
     }
-    row.note(FindingKind::Note, "an order row states what was filled of it, not how much was ordered");
     entries.orders.push(order);
     Ok(())
 }
@@ -155,7 +160,7 @@ fn execution(row: &mut Row<'_>) -> Result<(PaperFill, Option<PaperOrder>), Stop>
     Ok((fill, order))
 }
 
-fn time(row: &mut Row<'_>) -> Result<Option<crate::sim2real::Timestamp>, Stop> {
+fn time(row: &mut Row<'_>) -> Result<Option<Timestamp>, Stop> {
     row.time("dateTime", Written::Digits)
 }
 
@@ -182,7 +187,7 @@ fn take_back(draft: &mut Draft<'_>, busts: Vec<PaperFill>) {
             Some(fill) => format!("the fill of {} is taken back", fill.place),
             None => "a fill is taken back that is not in the log".to_owned(),
         };
-        let finding = super::PaperFinding::at(FindingKind::Bust, bust.place, message);
+        let finding = PaperFinding::at(FindingKind::Bust, bust.place, message);
         draft.log.findings.add(finding);
     }
 }

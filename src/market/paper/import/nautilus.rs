@@ -2,12 +2,14 @@
 //!
 //! Source: `nautilus_trader.analysis.reporter.ReportProvider`, version 1.221.
 
+use std::collections::HashMap;
+
 use super::super::{FindingKind, OrderWords, PaperFill, PaperStatus, TimeColumn, TimeMeaning};
 use super::draft::{Draft, Entries};
 use super::row::{Row, side_of};
 use super::stamp::Written;
 use super::{Format, Stop};
-use crate::io::{InputError, Records};
+use crate::io::{InputError, Place, Records};
 use crate::market::Cash;
 
 pub(super) static FORMAT: Format = Format {
@@ -36,8 +38,27 @@ fn read(tables: &[&Records], draft: &mut Draft<'_>) -> Result<(), InputError> {
     if !executions {
         draft.note(FindingKind::Note, "there is no report of fills: each order has one fill, at its average price");
     }
+    one_run(tables)?;
     for table in tables {
         draft.each(table, if is_orders(table) { order } else { fill })?;
+    }
+    Ok(())
+}
+
+/// Every run numbers its orders from 1: the reports of two have the same ids for other orders.
+fn one_run(tables: &[&Records]) -> Result<(), InputError> {
+    let mut first: HashMap<&str, &Records> = HashMap::new();
+    for table in tables.iter().filter(|table| is_fills(table)) {
+        for row in table.iter() {
+            let Some(id) = row.get("client_order_id") else { continue };
+            let known = first.entry(id).or_insert(table);
+            if known.path() != table.path() {
+                let message = format!("order {id} is filled in {} too: these are the reports of two runs", known.name());
+                return Err(InputError::new(table.path(), message)
+                    .at(Place::Row(row.row()))
+                    .hint("name the files of one run, not their folder"));
+            }
+        }
     }
     Ok(())
 }

@@ -1,11 +1,11 @@
 //! One record of a log under the eyes of a reader: cells as exact numbers and times, and what was odd about them.
 
-use super::super::super::{Cash, DecimalError, Price, Quantity, Rounded, Side};
 use super::super::{Charge, FindingKind, Liquidity, PaperFill, PaperFinding, PaperOrder, SourcePlace};
 use super::settings::worth;
 use super::stamp::{NoTime, Written, stamp};
 use super::{ImportSettings, Stop};
 use crate::io::{InputError, Place, Record};
+use crate::market::{Cash, DecimalError, Price, Quantity, Rounded, Side};
 use crate::sim2real::Timestamp;
 
 /// A record, and what was found in it so far.

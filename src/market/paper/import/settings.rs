@@ -6,8 +6,8 @@ use std::path::Path;
 use chrono_tz::Tz;
 use serde::Deserialize;
 
-use super::super::super::{Cash, Price};
-use crate::io::{InputError, Place, Renames, Table, read_toml};
+use crate::io::{InputError, Place, Table, read_toml};
+use crate::market::{Cash, Price};
 
 /// What the user adds to a log.
 #[derive(Debug, Clone, Default)]
@@ -52,7 +52,7 @@ impl SymbolMap {
             }
             return Ok(Self(map));
         }
-        let table = Table::read_with(path, &Renames::new())?;
+        let table = Table::read(path)?;
         let (theirs, ours) = (table.texts_complete("log_symbol")?, table.texts_complete("symbol")?);
         let mut map = BTreeMap::new();
         for (row, (theirs, ours)) in theirs.into_iter().zip(ours).enumerate() {

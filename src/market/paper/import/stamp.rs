@@ -3,6 +3,7 @@
 use chrono::{LocalResult, NaiveDate, NaiveDateTime, TimeZone};
 use chrono_tz::Tz;
 
+use crate::market::Cash;
 use crate::sim2real::Timestamp;
 
 /// How a log writes a column of times.
@@ -67,7 +68,7 @@ fn count(text: &str, unit: i64) -> Option<Timestamp> {
         return count.checked_mul(unit).map(Timestamp);
     }
     // Of numbers such as 1.723161256798e+18; prices are read by the same rule.
-    let nano: crate::market::Cash = text.parse().ok()?;
+    let nano: Cash = text.parse().ok()?;
     let instant = nano.0.checked_mul(i128::from(unit))? / 1_000_000_000_000_000_000;
     i64::try_from(instant).ok().map(Timestamp)
 }

@@ -1,5 +1,7 @@
 //! Logs in the form of this program: `orders.*` and `fills.*`, as backtests and imports write them.
 
+use std::collections::HashMap;
+
 use super::super::{Charge, FillOrigin, Liquidity, OrderWords, PaperFill, PaperStatus, TimeColumn, TimeMeaning};
 use super::draft::{Draft, Entries};
 use super::row::{Row, side_of};
@@ -34,7 +36,7 @@ fn read(tables: &[&Records], draft: &mut Draft<'_>) -> Result<(), InputError> {
         draft.each(table, order)?;
     }
     // Fills of a log that has them on one symbol name none.
-    let symbols: std::collections::HashMap<String, String> =
+    let symbols: HashMap<String, String> =
         draft.log.orders.iter().map(|order| (order.id.clone(), order.symbol.clone())).collect();
     for table in &fills {
         clock(draft, table, TimeColumn::FilledAt, TimeMeaning::Executed);
