@@ -53,8 +53,7 @@ fn read(tables: &[&Records], draft: &mut Draft<'_>) -> Result<(), InputError> {
                 let order = order(row, None)?;
                 let legs = row.text("legs").filter(|legs| *legs != "[]");
                 let id = order.id.clone();
-                entries.total(&order, Some(currency(&order.symbol)));
-                entries.orders.push(order);
+                add(row, order, entries)?;
                 legs.map_or(Ok(()), |legs| add_legs(row, legs, &id, entries))
             }
         })?;
@@ -64,6 +63,15 @@ fn read(tables: &[&Records], draft: &mut Draft<'_>) -> Result<(), InputError> {
 
 fn currency(symbol: &str) -> &str {
     pair(symbol).1.unwrap_or(CURRENCY)
+}
+
+/// Adds an order, and the fill that stands for its executions. Of one that works still and was filled in part no end is known:
+/// its record changed no earlier than that.
+fn add(row: &mut Row<'_>, order: PaperOrder, entries: &mut Entries) -> Result<(), Stop> {
+    let last = order.ended_at.or(row.time("updated_at", Written::Rfc3339)?);
+    entries.total(&PaperOrder { ended_at: last, ..order.clone() }, Some(currency(&order.symbol)));
+    entries.orders.push(order);
+    Ok(())
 }
 
 fn order(row: &mut Row<'_>, parent: Option<&str>) -> Result<PaperOrder, Stop> {
@@ -112,14 +120,10 @@ fn at_auction(kind: OrderWords, time_in_force: Option<&str>) -> OrderWords {
 fn add_legs(row: &mut Row<'_>, legs: &str, parent: &str, entries: &mut Entries) -> Result<(), Stop> {
     let legs = json_records(Path::new("legs"), legs).map_err(|_| row.unread("legs", "expected an array of orders"))?;
     for leg in legs.iter() {
-        let leg = row.within(leg, "legs", |leg| {
+        row.within(leg, "legs", |leg| {
             let order = order(leg, Some(parent))?;
-            Ok(order)
-        });
-        if let Some(order) = leg? {
-            entries.total(&order, Some(currency(&order.symbol)));
-            entries.orders.push(order);
-        }
+            add(leg, order, entries)
+        })?;
     }
     Ok(())
 }

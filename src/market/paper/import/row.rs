@@ -108,14 +108,10 @@ impl<'a> Row<'a> {
         Ok(self.price(key)?.filter(|price| price.0 != 0))
     }
 
-    /// A price that must be there.
+    /// A price that must be there; those of spreads and of some commodities are negative.
     pub fn need_price(&mut self, key: &str) -> Result<Price, Stop> {
         let text = self.need(key)?;
-        let price = self.number_of(key, text, Price::nearest_decimal)?;
-        if price.0 < 0 {
-            return Err(self.unread(key, "expected a price that is not negative"));
-        }
-        Ok(price)
+        self.number_of(key, text, Price::nearest_decimal)
     }
 
     /// A quantity; none where the cell is empty.
