@@ -95,7 +95,7 @@ fn names(database: &Connection) -> Result<Vec<String>, rusqlite::Error> {
 
 fn table(database: &Connection, path: &Path, name: &str) -> Result<Records, rusqlite::Error> {
     let mut statement = database.prepare(&format!("SELECT * FROM \"{}\"", name.replace('"', "\"\"")))?;
-    let columns: Vec<String> = statement.column_names().into_iter().map(str::to_owned).collect();
+    let columns: Vec<String> = statement.column_names().map(str::to_owned).collect();
     let mut records = Records::new(path, Some(name));
     columns.iter().for_each(|column| records.declare(column));
     let mut rows = statement.query([])?;
