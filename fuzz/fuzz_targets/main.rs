@@ -13,6 +13,7 @@ mod equations;
 mod history;
 mod journal;
 mod orders;
+mod paper;
 mod run;
 mod scene;
 mod stream;
@@ -32,7 +33,7 @@ use scene::Scene;
 type Target = (&'static str, fn(&Scene, &[u8]));
 
 /// The targets, by their names, which are those of their folders in `fuzz/seeds`.
-const TARGETS: [Target; 16] = [
+const TARGETS: [Target; 20] = [
     ("account", account::target),
     ("arrow", columnar::arrow),
     ("chunks", stream::chunks),
@@ -42,6 +43,10 @@ const TARGETS: [Target; 16] = [
     ("history", history::target),
     ("journal", journal::target),
     ("orders", orders::target),
+    ("paper_json", paper::json),
+    ("paper_sqlite", paper::sqlite),
+    ("paper_table", paper::table),
+    ("paper_xml", paper::xml),
     ("parquet", columnar::parquet),
     ("run", run::target),
     ("stream", stream::target),

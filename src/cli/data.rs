@@ -1,4 +1,7 @@
-//! `trueup data`: the data sets that come with the project.
+//! `trueup data`: the data sets that come with the project, and logs that come from elsewhere.
+
+mod import;
+mod told;
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +14,7 @@ use crate::sim2real::Timestamp;
 use super::screen::Screen;
 use super::stop::{Outcome, Stop};
 
-/// Make the data sets that come with the project
+/// Make the data sets that come with the project, or read logs of brokers and bots
 #[derive(Debug, Args)]
 pub(super) struct Data {
     #[command(subcommand)]
@@ -21,6 +24,7 @@ pub(super) struct Data {
 #[derive(Debug, Subcommand)]
 enum DataCommand {
     Make(Make),
+    Import(import::Import),
 }
 
 /// Write the generated data sets: a servo recording, a day of orders and a month of minute bars
@@ -43,11 +47,19 @@ struct Make {
 
 impl Data {
     pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
-        let DataCommand::Make(make) = self.command;
-        let overwrite = if make.force { Overwrite::Force } else { Overwrite::Refuse };
+        match self.command {
+            DataCommand::Make(make) => make.run(screen),
+            DataCommand::Import(import) => import.run(screen),
+        }
+    }
+}
+
+impl Make {
+    fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
+        let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
         let folders = catalogue()
             .iter()
-            .map(|set| prepared(set, &make.out.join(set.name), overwrite))
+            .map(|set| prepared(set, &self.out.join(set.name), overwrite))
             .collect::<Result<Vec<OutputFolder>, InputError>>()?;
         let mut text = String::new();
         for folder in folders {

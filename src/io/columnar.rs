@@ -50,10 +50,9 @@ impl ColumnarFile {
     /// Reads `file`, which was opened from `path`.
     ///
     /// # Errors
-    /// A file that is empty, truncated or corrupt, and one without rows.
+    /// A file that is empty, truncated or corrupt.
     pub(super) fn read(path: &Path, file: File, container: Container) -> Result<Self, InputError> {
-        let table = caught(path, container, || load(file, container))?;
-        if table.frame.height() == 0 { Err(no_rows(path)) } else { Ok(table) }
+        caught(path, container, || load(file, container))
     }
 
     /// The rows of `frame` as a table of the file whose columns are `columns`.

@@ -29,19 +29,10 @@ struct Rows {
 }
 
 impl CsvText {
-    /// Cuts `bytes`, which were read from `path`.
-    ///
-    /// # Errors
-    /// Bytes that are not UTF-8, an empty file, a header only, rows of different lengths, a quote that is not closed.
-    pub(super) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, InputError> {
-        let csv = Self::first_block(path, bytes)?;
-        if csv.rows() == 0 { Err(no_rows(path, csv.header_line)) } else { Ok(csv) }
-    }
-
     /// Cuts the complete lines with which the file begins, the header among them; there may be no rows among them.
     ///
     /// # Errors
-    /// As [`parse`](Self::parse), but for a header only.
+    /// Bytes that are not UTF-8, an empty file, rows of different lengths, a quote that is not closed.
     pub(super) fn first_block(path: &Path, bytes: Vec<u8>) -> Result<Self, InputError> {
         let mut text = decode(path, bytes, 1)?;
         if text.starts_with('\u{feff}') {
@@ -260,7 +251,8 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<CsvText, InputError> {
-        CsvText::parse(Path::new("a.csv"), text.as_bytes().to_vec())
+        let csv = CsvText::first_block(Path::new("a.csv"), text.as_bytes().to_vec())?;
+        if csv.rows() == 0 { Err(csv.no_rows(Path::new("a.csv"))) } else { Ok(csv) }
     }
 
     #[test]
@@ -281,7 +273,7 @@ mod tests {
         assert_eq!(line("a,b\n1,2\n3,4,5\n"), Some((Place::Row(3), Some("3".into()))));
         assert_eq!(line("a,b\n1,\"2\n3,4\n"), Some((Place::Row(2), Some(r#""\"2\n3,4\n""#.into()))));
         assert_eq!(line("  \n"), Some((Place::File, None)));
-        let bytes = CsvText::parse(Path::new("a.csv"), b"a\n1\n\xfc\n".to_vec()).err().unwrap();
+        let bytes = CsvText::first_block(Path::new("a.csv"), b"a\n1\n\xfc\n".to_vec()).err().unwrap();
         assert_eq!((bytes.place, bytes.found.as_deref()), (Place::Row(3), Some("byte 0xfc")));
     }
 }

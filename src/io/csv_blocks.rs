@@ -47,7 +47,7 @@ impl CsvBlocks {
     /// The next rows; none at the end.
     ///
     /// # Errors
-    /// As [`CsvText::parse`], and a row longer than 16 MB.
+    /// As [`CsvText::first_block`], and a row longer than 16 MB.
     pub(super) fn next(&mut self) -> Result<Option<CsvText>, InputError> {
         loop {
             let bytes = self.complete_rows()?;

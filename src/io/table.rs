@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use super::columnar::{Column, ColumnarFile};
+use super::cell::{INFINITE, NO_INTEGER, Wrong, integer, number};
+use super::columnar::{Column, ColumnarFile, no_rows};
 use super::csv::CsvText;
 use super::error::{InputError, Place, did_you_mean, hint_among, listed};
 use super::source::{Ending, bytes, open, unzip};
@@ -51,10 +52,23 @@ impl Table {
     /// # Errors
     /// As [`read`](Self::read), and a rename of a column the file does not have.
     pub fn read_with(path: impl AsRef<Path>, renames: &Renames) -> Result<Self, InputError> {
+        let table = Self::read_even_empty(path, renames)?;
+        match &table.body {
+            _ if table.rows() > 0 => Ok(table),
+            Body::Csv(csv) => Err(csv.no_rows(&table.path)),
+            Body::Columnar(_) => Err(no_rows(&table.path)),
+        }
+    }
+
+    /// As [`read_with`](Self::read_with), but a table of columns without rows is one: a log of a day without fills.
+    ///
+    /// # Errors
+    /// As [`read_with`](Self::read_with), but for that.
+    pub fn read_even_empty(path: impl AsRef<Path>, renames: &Renames) -> Result<Self, InputError> {
         let path = path.as_ref();
         let body = match Ending::of(path)? {
-            Ending::Csv => Body::Csv(CsvText::parse(path, bytes(path, open(path)?)?)?),
-            Ending::CsvGz => Body::Csv(CsvText::parse(path, unzip(path, open(path)?)?)?),
+            Ending::Csv => Body::Csv(CsvText::first_block(path, bytes(path, open(path)?)?)?),
+            Ending::CsvGz => Body::Csv(CsvText::first_block(path, unzip(path, open(path)?)?)?),
             Ending::Columnar(container) => Body::Columnar(ColumnarFile::read(path, open(path)?, container)?),
         };
         let table = Self { path: path.to_path_buf(), renames: renames.clone(), body, before: 0 };
@@ -95,7 +109,7 @@ impl Table {
         &self.path
     }
 
-    /// Number of data rows; at least 1.
+    /// Number of data rows; at least 1, but of [`read_even_empty`](Self::read_even_empty).
     #[must_use]
     pub fn rows(&self) -> usize {
         match &self.body {
@@ -135,6 +149,12 @@ impl Table {
             Some(name) => Err(InputError::new(&self.path, format!("`columns` renames to `{name}`, which nothing reads"))
                 .maybe_hint(hint_among(name, meaningful))),
         }
+    }
+
+    /// Whether the column of that name is one of times by its type.
+    #[must_use]
+    pub(super) fn is_of_times(&self, name: &str) -> bool {
+        matches!(self.column(name), Ok(Cells::Typed(Column::Instants(_) | Column::Naive(_))))
     }
 
     /// A column of numbers; `None` where the cell is empty, null or NaN. Integers are converted.
@@ -321,7 +341,7 @@ impl Table {
         InputError::new(&self.path, format!("expected {expected}")).in_column(self.own_name(name)).found(kind).hint(hint)
     }
 
-    fn cell_error(&self, name: &str, row: usize, (message, hint): (&str, &str), text: &str) -> InputError {
+    fn cell_error(&self, name: &str, row: usize, (message, hint): Wrong, text: &str) -> InputError {
         self.error(name, row, message).found_text(text).hint(hint)
     }
 
@@ -362,34 +382,4 @@ fn each<V, T>(
     convert: impl Fn(usize, V) -> Result<T, InputError>,
 ) -> Result<Vec<Option<T>>, InputError> {
     values.into_iter().enumerate().map(|(row, value)| value.map(|v| convert(row, v)).transpose()).collect()
-}
-
-/// What is wrong with a cell, and the remedy.
-type Wrong = (&'static str, &'static str);
-const INFINITE: Wrong = ("expected a finite number", "leave the cell empty where a sample was lost");
-const NO_NUMBER: Wrong = ("expected a number", "leave the cell empty where a sample was lost");
-const NO_INTEGER: Wrong = ("expected an integer", "round the column, or write it without a fraction");
-
-fn number(text: &str) -> Result<Option<f64>, Wrong> {
-    let text = text.trim();
-    if text.is_empty() {
-        return Ok(None);
-    }
-    match text.parse::<f64>() {
-        Ok(value) if value.is_nan() => Ok(None),
-        Ok(value) if value.is_infinite() => Err(INFINITE),
-        Ok(value) => Ok(Some(value)),
-        Err(_) => Err(NO_NUMBER),
-    }
-}
-
-fn integer(text: &str) -> Result<Option<i64>, Wrong> {
-    match text.trim().parse::<i64>() {
-        Ok(value) => Ok(Some(value)),
-        Err(_) => match number(text) {
-            Ok(None) => Ok(None),
-            Ok(Some(value)) => as_integer(value).map(Some).ok_or(NO_INTEGER),
-            Err(_) => Err(NO_INTEGER),
-        },
-    }
 }

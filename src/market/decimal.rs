@@ -138,7 +138,7 @@ impl FromStr for Cash {
 
 /// Whole units of 1e-9 to the last digit, without the zeros at the end.
 fn show_nanos(nanos: i64, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    Cash(i128::from(nanos) * 1_000_000_000).fmt(f)
+    fmt::Display::fmt(&Cash(i128::from(nanos) * 1_000_000_000), f)
 }
 
 impl fmt::Display for Price {

@@ -55,6 +55,30 @@ pub enum TimeMeaning {
 }
 
 impl TimeMeaning {
+    /// All there are.
+    pub const ALL: [Self; 7] =
+        [Self::Decided, Self::Submitted, Self::Accepted, Self::Executed, Self::Reported, Self::Polled, Self::Updated];
+
+    /// Its word in the tables that are written.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Decided => "decided",
+            Self::Submitted => "submitted",
+            Self::Accepted => "accepted",
+            Self::Executed => "executed",
+            Self::Reported => "reported",
+            Self::Polled => "polled",
+            Self::Updated => "updated",
+        }
+    }
+
+    /// The meaning that `word` stands for.
+    #[must_use]
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|meaning| meaning.word() == word)
+    }
+
     /// What it says, to be put after "it is".
     #[must_use]
     pub fn words(self) -> &'static str {

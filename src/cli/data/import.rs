@@ -1,0 +1,124 @@
+//! `trueup data import`: the logs of brokers and bots in the form of this program.
+
+use std::path::PathBuf;
+
+use chrono_tz::Tz;
+use clap::Args;
+
+use crate::io::{InputError, OutputFolder, Overwrite, did_you_mean, hint_among};
+use crate::market::paper::PaperLog;
+use crate::market::paper::import::{FORMATS, FeeRates, ImportSettings, SymbolMap, import};
+
+use super::super::screen::Screen;
+use super::super::stop::{Outcome, Stop};
+use super::told::told;
+
+/// Read a log of paper or live orders, as a broker or a bot wrote it
+///
+/// The format is told by the content: alpaca, binance, ccxt, freqtrade, hftbacktest, hummingbot, ibkr_flex, nautilus or
+/// trueup. Numbers are read exactly; what cannot be read, and what must be known of a log before it is compared with
+/// anything, is counted and said. Without --out nothing is written.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  trueup data import tradesv3.sqlite --out logs/bot
+  trueup data import orders.json activities.json --symbols symbols.toml --out logs/alpaca
+  trueup data import flex.xml --zone America/New_York --fee-rate CAD/USD=0.785")]
+pub(super) struct Import {
+    /// Files of the log, or folders of which all files are read together
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Format of the log [default: told by its content]
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<String>,
+    /// Names of symbols: a TOML file with a table [symbols], or a table with columns log_symbol and symbol
+    #[arg(long, value_name = "MAP")]
+    symbols: Option<PathBuf>,
+    /// Zone of times that have none, such as America/New_York
+    #[arg(long, value_name = "ZONE", value_parser = zone)]
+    zone: Option<Tz>,
+    /// What one unit of a currency in which fees were taken is worth in that of the price, such as BNB/USDT=612.5; fees
+    /// without a rate are kept apart [may be given several times]
+    #[arg(long = "fee-rate", value_name = "FROM/TO=RATE")]
+    rates: Vec<String>,
+    /// Folder to write orders.parquet, fills.parquet and findings.json into
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write over files that exist
+    #[arg(long)]
+    force: bool,
+    /// Print findings.json (schema trueup.paper_log/1) on standard output instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+/// The files that are written.
+const FILES: [&str; 3] = ["orders.parquet", "fills.parquet", "findings.json"];
+
+impl Import {
+    pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
+        let settings = self.settings()?;
+        let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
+        if let Some(folder) = &self.out {
+            OutputFolder::create(folder, overwrite)?.check_free(&FILES)?;
+        }
+        let progress = screen.progress();
+        progress.tell("Reading", 0, 0);
+        let log = import(&self.paths, &settings)?;
+        drop(progress);
+        let json = format!("{}\n", serde_json::to_string_pretty(&log.summary())?);
+        let mut text = if self.json { json.clone() } else { told(&log, screen) };
+        match &self.out {
+            Some(folder) => {
+                let written = write(&log, &json, OutputFolder::create(folder, overwrite)?)?;
+                if !self.json {
+                    text += "\n";
+                    written.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+                }
+            }
+            None if !self.json => text += "\nNothing was written; --out DIR writes tables and findings.\n",
+            None => {}
+        }
+        screen.print(&text)?;
+        Ok(Outcome::Done)
+    }
+
+    fn settings(&self) -> Result<ImportSettings, InputError> {
+        let mut rates = FeeRates::default();
+        for rate in &self.rates {
+            rates.add(rate).map_err(|error| {
+                let text = error.to_string();
+                let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
+                InputError::new("--fee-rate", message).hint(hint)
+            })?;
+        }
+        if let Some(format) = self.format.as_ref().filter(|id| FORMATS.iter().all(|format| format.id != **id)) {
+            let ids = FORMATS.map(|format| format.id);
+            let error = InputError::new("--format", "there is no such format").found_text(format);
+            return Err(error.maybe_hint(hint_among(format, &ids)));
+        }
+        Ok(ImportSettings {
+            format: self.format.clone(),
+            symbols: self.symbols.as_deref().map(SymbolMap::read).transpose()?.unwrap_or_default(),
+            zone: self.zone,
+            rates,
+        })
+    }
+}
+
+fn write(log: &PaperLog, json: &str, mut output: OutputFolder) -> Result<Vec<PathBuf>, InputError> {
+    let [orders, fills, findings] = FILES;
+    output.table(orders, &log.orders_table())?;
+    output.table(fills, &log.fills_table())?;
+    output.file(findings, json.as_bytes())?;
+    output.finish()
+}
+
+/// A zone by its name in the IANA database.
+fn zone(text: &str) -> Result<Tz, String> {
+    text.parse().map_err(|_| {
+        let meant = did_you_mean(text, chrono_tz::TZ_VARIANTS.iter().map(|zone| zone.name()));
+        let hint = meant.map_or_else(|| "such as America/New_York".to_owned(), |meant| format!("did you mean {meant}?"));
+        format!("there is no such zone\n  hint: {hint}")
+    })
+}
