@@ -54,6 +54,7 @@ mod price_assumption;
 mod quote;
 mod rates;
 mod reason;
+pub mod reconcile;
 mod row_check;
 #[cfg(feature = "io")]
 mod run;

@@ -204,6 +204,14 @@ impl Cash {
         (if self.0 < 0 { -size } else { size }) * 1e-18
     }
 
+    /// The floating-point number that is nearest of all [currency]: whoever writes it with the fewest digits that tell it apart
+    /// from others writes the amount again, where that has no more than 15 digits.
+    #[must_use]
+    pub fn nearest_f64(self) -> f64 {
+        // Reading a decimal number is what rounds right, however long it is.
+        self.to_string().parse().unwrap_or_else(|_| self.to_f64())
+    }
+
     /// The sum.
     ///
     /// # Errors
@@ -316,6 +324,14 @@ mod tests {
 
     pub(super) fn instrument(tick_size: f64, lot_size: f64) -> Instrument {
         Instrument { symbol: "XYZ".into(), tick_size, lot_size, average_daily_volume: None, daily_volatility: None }
+    }
+
+    #[test]
+    fn an_amount_is_written_as_the_decimal_number_it_is() {
+        for nanos in [1_i128, 12_345_000_000, 99_999_999_999_999, -370_801_800_000] {
+            let cash = Cash(nanos * 1_000_000_000);
+            assert_eq!(cash.nearest_f64().to_string(), cash.to_string());
+        }
     }
 
     #[test]

@@ -2,10 +2,13 @@
 
 use crate::sim2real::{Command, DelayLine, Tick, Timestamp};
 
+use serde::Serialize;
+
 use super::{Multiplier, Price};
 
 /// Which way an order trades.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Side {
     /// Takes from the asks.
     Buy,

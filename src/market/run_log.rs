@@ -240,7 +240,7 @@ impl Record {
             .times("filled_at", fills.iter().map(|f| f.filled_at))
             .floats("qty", fills.iter().map(|f| f.quantity.to_f64()))
             .floats("price", fills.iter().map(|f| f.price.to_f64()))
-            .floats("fee", fills.iter().map(|f| f.fee.to_f64()))
+            .floats("fee", fills.iter().map(|f| f.fee.nearest_f64()))
             .texts("liquidity", fills.iter().map(|f| f.why.role.word().to_owned()))
             .integers("fill_id", fills.iter().map(|f| f.fill_id as i64))
             .texts("data", fills.iter().map(|f| f.why.data.word().to_owned()))
