@@ -47,6 +47,8 @@ const QUARTER: f64 = 900.0;
 const QUARTERS: i64 = 96;
 /// How near two stamps are to be, in one round after the other [s].
 const NEAR: [f64; 4] = [60.0, 10.0, 2.0, 0.5];
+/// Widths of the bins in which differences of stamps are counted [s].
+const BINS: [f64; 3] = [0.25, 2.0, 20.0];
 /// Orders an offset is estimated from at most.
 const SAMPLE: usize = 2_000;
 /// The fewest pairs that tell of a drift.
@@ -66,22 +68,29 @@ pub fn clock_difference(backtest: &[Life], paper: &[Life]) -> ClockDifference {
         sample.iter().filter_map(|(order, at)| Some((*at, stamps.gap(order, at + offset, near)?))).collect()
     };
     let zones = (-QUARTERS..=QUARTERS).map(|k| k as f64 * QUARTER);
-    let tried = zones.chain(stamps.commonest(&sample));
-    // Of equal numbers of pairs the smallest offset is the likeliest.
-    let best = tried.map(|offset| (gaps(offset, NEAR[0]).len(), offset));
-    let Some((mut found, start)) = best.max_by(|a, b| a.0.cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs()))) else {
-        return ClockDifference::none(origin);
+    let tried = zones.chain(BINS.into_iter().filter_map(|width| stamps.commonest(&sample, width)));
+    let rate = |near: f64| sample.iter().map(|(order, _)| stamps.by_chance(order, near)).sum::<f64>();
+    let by_chance = NEAR.map(rate);
+    // By how many standard deviations more orders lie that near than chance would have it.
+    let sure = |offset: f64, level: usize| {
+        let (found, expected) = (gaps(offset, NEAR[level]).len() as f64, by_chance[level]);
+        (found - expected) / (expected * (1.0 - expected / sample.len() as f64).max(0.0) + 1.0).sqrt()
     };
-    let (mut offset, mut pairs) = (start, Vec::new());
-    for near in NEAR {
-        let nearer = gaps(offset, near);
+    let rated = tried.flat_map(|offset| (0..NEAR.len()).map(move |level| (offset, level)));
+    let rated = rated.map(|(offset, level)| (sure(offset, level), offset, level));
+    // Of equally sure ones the smallest offset is the likeliest.
+    let best = rated.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())));
+    let Some((_, start, level)) = best else { return ClockDifference::none(origin) };
+    let (mut offset, mut pairs, mut found) = (start, Vec::new(), 0);
+    for near in &NEAR[level..] {
+        let nearer = gaps(offset, *near);
         // Nearer than the logs agree at all there are only chance pairs.
         if nearer.is_empty() || 2 * nearer.len() < found {
             break;
         }
         found = nearer.len();
         offset += median(nearer.iter().map(|(_, gap)| *gap));
-        pairs = gaps(offset, near);
+        pairs = gaps(offset, *near);
     }
     if pairs.is_empty() {
         return ClockDifference::none(origin);
@@ -113,7 +122,8 @@ fn drift(pairs: &[(f64, f64)]) -> f64 {
     median(slopes.into_iter())
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
+/// The middle of `values`; 0 of none.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     if values.is_empty() {
         return 0.0;
@@ -149,20 +159,26 @@ impl<'a> Stamps<'a> {
         gaps.min_by(|a, b| a.abs().total_cmp(&b.abs())).filter(|gap| gap.abs() <= near)
     }
 
-    /// By how much orders of the same size lie apart most often, within an hour [s].
-    fn commonest(&self, sample: &[(&Life, f64)]) -> Option<f64> {
+    /// How likely it is that an order like this one lies within `near` [s] of a time by chance.
+    fn by_chance(&self, order: &Life, near: f64) -> f64 {
+        let like = self.like(order);
+        let (Some(first), Some(last)) = (like.first(), like.last()) else { return 0.0 };
+        1.0 - (-2.0 * near * like.len() as f64 / (last.0 - first.0).max(2.0 * near)).exp()
+    }
+
+    /// By how much orders of the same size lie apart most often, within an hour [s], in bins of `width` [s].
+    fn commonest(&self, sample: &[(&Life, f64)], width: f64) -> Option<f64> {
         const REACH: f64 = 3_600.0;
-        const WIDTH: f64 = 5.0;
-        const MOST: usize = 200;
+        const MOST: usize = 400;
         let mut votes: BTreeMap<i64, usize> = BTreeMap::new();
         for (order, at) in sample.iter().step_by(sample.len().div_ceil(MOST).max(1)) {
             let like = self.like(order);
             let from = like.partition_point(|(stamp, _)| *stamp < at - REACH);
             let near = like[from..].iter().take_while(|(stamp, _)| *stamp <= at + REACH).take(MOST);
             for (stamp, _) in near.filter(|(_, quantity)| *quantity == order.ordered) {
-                *votes.entry(((stamp - at) / WIDTH).round() as i64).or_default() += 1;
+                *votes.entry(((stamp - at) / width).round() as i64).or_default() += 1;
             }
         }
-        votes.into_iter().max_by_key(|(bin, count)| (*count, -bin.abs())).map(|(bin, _)| bin as f64 * WIDTH)
+        votes.into_iter().max_by_key(|(bin, count)| (*count, -bin.abs())).map(|(bin, _)| bin as f64 * width)
     }
 }
