@@ -17,7 +17,9 @@ impl Scene {
     fn new(samples: &[&str]) -> Self {
         let folder = TempDir::new().unwrap();
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/paper_scene/samples");
-        samples.iter().for_each(|name| drop(fs::copy(source.join(name), folder.path().join(name)).unwrap()));
+        for name in samples {
+            fs::copy(source.join(name), folder.path().join(name)).unwrap();
+        }
         Self(folder)
     }
 

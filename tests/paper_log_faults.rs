@@ -11,12 +11,12 @@ use std::path::{Path, PathBuf};
 
 use paper_scene::{Written, new_york, read, sample};
 use proptest::prelude::*;
-use trueup::io::{OutputFolder, Overwrite};
+use trueup::io::{OutputFolder, Overwrite, TwinFile};
 use trueup::market::paper::import::{FORMATS, ImportSettings, SymbolMap, import};
 use trueup::market::paper::{
     Charge, FillOrigin, FindingKind, Liquidity, OrderWords, PaperFill, PaperLog, PaperOrder, PaperStatus, SourcePlace,
 };
-use trueup::market::{Cash, Price, Quantity, Side};
+use trueup::market::{Cash, Price, Quantity, Side, execution_logs};
 use trueup::sim2real::Timestamp;
 
 const ORDERS: &str = "order_id,symbol,decided_at,side,qty,type,limit_price\n\
@@ -153,6 +153,16 @@ fn without_places(mut log: PaperLog) -> (Vec<PaperOrder>, Vec<PaperFill>) {
     log.orders.iter_mut().for_each(|order| order.place = SourcePlace::default());
     log.fills.iter_mut().for_each(|fill| fill.place = SourcePlace::default());
     (log.orders, log.fills)
+}
+
+#[test]
+fn a_diagnosis_reads_the_same_from_a_log_that_was_imported() {
+    let set = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/execution");
+    let folder = tempfile::tempdir().unwrap();
+    let imported = write(&read(std::slice::from_ref(&set)), folder.path(), "parquet");
+    let twin = TwinFile::read(set.join("twin.toml")).unwrap();
+    let [ours, theirs] = [imported, set].map(|folder| execution_logs(&twin, &[folder]).unwrap().remove(0));
+    assert_eq!((ours.time, ours.measured), (theirs.time, theirs.measured));
 }
 
 #[test]

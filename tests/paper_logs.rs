@@ -95,6 +95,7 @@ fn flex_is_read_in_its_zone_without_what_was_taken_back() {
     use FindingKind as F;
     let found = |kind| log.findings.count(kind);
     assert_eq!((found(F::Bust), found(F::Correction), found(F::MixedZones), found(F::UnreadRow)), (1, 1, 1, 1));
+    assert_eq!((order(&log, "901").filled, found(F::FilledOtherwise)), (Some(quantity("25")), 0));
     let unread = log.findings.of(F::UnreadRow)[0].to_string();
     assert!(unread.ends_with("Trade: row 6, column `tradePrice`: expected a decimal number, found \"94,5\""), "{unread}");
 }
@@ -237,7 +238,7 @@ fn real_databases_of_freqtrade_hold_what_sqlite_counts() {
         ("gtudor33_dryrun_binanceus_2021-12", 115, 112, 110_878.699_990_807_69, 110.878_699_990_807_68, 27),
         ("roger_dryrun_kucoin_2026-04", 11, 11, 118.419_314_83, 0.203_158_488_83, 7),
         ("selskas_dryrun_2021-04", 153, 153, 1.529_113_132_318_162_7, 0.001_529_113_132_318_163_5, 10),
-        ("th2002_dryrun_2024-07", 25, 6, 631_704_870.168_331_65, 631_704.870_168_331_5, 4),
+        ("th2002_dryrun_2024-07", 25, 6, 631_704_870.168_331_6, 631_704.870_168_331_5, 4),
     ];
     for (name, orders, fills, value, fees, symbols) in cases {
         let Some(path) = recorded(&format!("freqtrade/{name}/tradesv3.sqlite")) else { return };

@@ -1,5 +1,5 @@
-//! Files: the only file access below the command line. Reads and writes tables and TOML documents; what their rows
-//! and keys mean is the domains' business: nothing here knows a joint or an order.
+//! Files: the only file access below the command line. Reads and writes tables and TOML documents, and reads records of
+//! JSON, XML and SQLite; what their rows and keys mean is the domains' business: nothing here knows a joint or an order.
 
 mod arrow_buffers;
 mod cell;

@@ -9,7 +9,6 @@ use super::records::Records;
 use super::source::{Ending, open, unreadable};
 use super::sqlite::{MAGIC, read_sqlite};
 use super::table::{Renames, Table};
-use super::time_format::TimeFormat;
 use super::xml::read_xml;
 
 /// What a file holds, as records.
@@ -22,11 +21,11 @@ pub struct RecordFile {
 }
 
 /// Reads a file: CSV, Parquet or Arrow by the ending of its name, SQLite, JSON or XML by how it begins. Of a database only the
-/// tables in `wanted` are read. Times of a table that are times by type and have no zone are in that of `format`.
+/// tables in `wanted` are read.
 ///
 /// # Errors
 /// As those of the readers, and a file that is none of these.
-pub fn read_records(path: &Path, wanted: &[&str], format: &TimeFormat) -> Result<RecordFile, InputError> {
+pub fn read_records(path: &Path, wanted: &[&str]) -> Result<RecordFile, InputError> {
     let whole = |tables: Vec<Records>| RecordFile { tables, passed_over: Vec::new() };
     let mut beginning = Vec::new();
     open(path)?.take(512).read_to_end(&mut beginning).map_err(|error| unreadable(path, &error))?;
@@ -47,7 +46,7 @@ pub fn read_records(path: &Path, wanted: &[&str], format: &TimeFormat) -> Result
         };
     }
     let table = Table::read_even_empty(path, &Renames::new())?;
-    Records::of_table(&table, format).map(|records| whole(vec![records]))
+    Ok(whole(vec![Records::of_table(&table)]))
 }
 
 /// The files in a folder that may hold records, by the endings of their names, in order of these.
@@ -81,8 +80,7 @@ mod tests {
         let read = |name: &str, text: &str| {
             let path = folder.path().join(name);
             std::fs::write(&path, text).unwrap();
-            read_records(&path, &[], &TimeFormat::default())
-                .map(|file| file.tables.iter().map(Records::len).collect::<Vec<_>>())
+            read_records(&path, &[]).map(|file| file.tables.iter().map(Records::len).collect::<Vec<_>>())
         };
         assert_eq!(read("a.csv", "x\n1\n2\n"), Ok(vec![2]));
         assert_eq!(read("b.csv", "x,y\n"), Ok(vec![0]));

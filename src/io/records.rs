@@ -3,9 +3,8 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use super::Place;
 use super::table::Table;
-use super::time_format::TimeFormat;
-use super::{InputError, Place};
 
 /// Records read from one file, or from one table of a file that has several. Cells are texts, as the file writes them; a record
 /// has only the keys that it has values for.
@@ -143,21 +142,12 @@ impl Records {
         &self.unread
     }
 
-    /// The rows of a table; times by type become RFC 3339, those without a zone in that of `format`. Columns of other types, such
+    /// The rows of a table. Times by type become texts, without an offset where the file gives no zone; columns of other types, such
     /// as lists, are left out.
-    ///
-    /// # Errors
-    /// A local time that the clocks skip.
-    pub fn of_table(table: &Table, format: &TimeFormat) -> Result<Self, InputError> {
-        let mut columns: Vec<(&str, Vec<Option<String>>)> = Vec::new();
-        for name in table.names() {
-            if let Ok(texts) = table.texts(name) {
-                columns.push((name, texts));
-            } else if table.is_of_times(name) {
-                let times = table.times_with_holes(name, format)?;
-                columns.push((name, times.into_iter().map(|time| time.map(|t| t.to_string())).collect()));
-            }
-        }
+    #[must_use]
+    pub fn of_table(table: &Table) -> Self {
+        let texts = |name| Some((name, table.texts(name).ok().or_else(|| table.time_texts(name))?));
+        let mut columns: Vec<(&str, Vec<Option<String>>)> = table.names().into_iter().filter_map(texts).collect();
         let mut records = Self::new(table.path(), None);
         columns.iter().for_each(|(name, _)| records.declare(name));
         for row in 0..table.rows() {
@@ -165,7 +155,7 @@ impl Records {
             let cells = columns.iter_mut().filter_map(|(name, texts)| Some((*name, texts.get_mut(row)?.take()?)));
             records.push(number, cells.collect::<Vec<_>>());
         }
-        Ok(records)
+        records
     }
 }
 
@@ -193,7 +183,26 @@ impl<'a> Record<'a> {
 
 #[cfg(test)]
 mod tests {
+    use polars::prelude::{DataFrame, DataType, IntoColumn, NamedFrom, ParquetWriter, Series, TimeUnit, TimeZone};
+
     use super::*;
+
+    #[test]
+    fn times_by_type_have_a_zone_only_where_the_file_gives_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        let of = |name: &str, zone| {
+            let counts = Series::new(name.into(), [Some(1_500_i64), None]);
+            counts.cast(&DataType::Datetime(TimeUnit::Milliseconds, zone)).unwrap().into_column()
+        };
+        let columns = vec![of("naive", None), of("utc", Some(TimeZone::UTC))];
+        let mut frame = DataFrame::new_infer_height(columns).unwrap();
+        ParquetWriter::new(std::fs::File::create(&path).unwrap()).finish(&mut frame).unwrap();
+        let records = Records::of_table(&Table::read(&path).unwrap());
+        let rows: Vec<_> = records.iter().map(|row| (row.row(), row.get("naive"), row.get("utc"))).collect();
+        let first = (1, Some("1970-01-01T00:00:01.500000000"), Some("1970-01-01T00:00:01.500Z"));
+        assert_eq!(rows, [first, (2, None, None)]);
+    }
 
     #[test]
     fn a_record_has_what_it_has_and_of_twins_the_last() {

@@ -1,6 +1,7 @@
 //! SQLite databases as records, read from a copy: nothing is ever written beside the user's file, and no lock is taken on it.
 
 use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use rusqlite::types::ValueRef;
@@ -43,10 +44,15 @@ pub fn read_sqlite(path: impl AsRef<Path>, wanted: &[&str]) -> Result<Database, 
         let tables = names.iter().filter(is_wanted).map(|name| table(&database, path, name)).collect::<Result<_, _>>()?;
         Ok(Database { tables, names })
     };
-    read().map_err(|error| {
+    let refused = |reason: &str| {
         let hint = "is it a whole SQLite database? Copy it with its `-wal` file, or let the bot end first";
-        InputError::new(path, format!("expected an SQLite database ({error})")).hint(hint)
-    })
+        InputError::new(path, format!("expected an SQLite database ({reason})")).hint(hint)
+    };
+    // The library panics on names of columns that are no UTF-8, and a damaged log must not take the process with it.
+    match catch_unwind(AssertUnwindSafe(read)) {
+        Ok(result) => result.map_err(|error| refused(&error.to_string())),
+        Err(_) => Err(refused("its contents contradict each other")),
+    }
 }
 
 const NAME: &str = "copy";

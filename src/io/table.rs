@@ -151,10 +151,17 @@ impl Table {
         }
     }
 
-    /// Whether the column of that name is one of times by its type.
-    #[must_use]
-    pub(super) fn is_of_times(&self, name: &str) -> bool {
-        matches!(self.column(name), Ok(Cells::Typed(Column::Instants(_) | Column::Naive(_))))
+    /// The texts of a column that is one of times by its type: RFC 3339, without an offset where the file gives no zone.
+    pub(super) fn time_texts(&self, name: &str) -> Option<Vec<Option<String>>> {
+        match self.column(name).ok()? {
+            Cells::Typed(Column::Instants(values)) => {
+                Some(values.into_iter().map(|v| v.map(|ns| Timestamp(ns).to_string())).collect())
+            }
+            Cells::Typed(Column::Naive(values)) => {
+                Some(values.into_iter().map(|v| v.map(|t| t.format("%Y-%m-%dT%H:%M:%S%.9f").to_string())).collect())
+            }
+            _ => None,
+        }
     }
 
     /// A column of numbers; `None` where the cell is empty, null or NaN. Integers are converted.

@@ -8,6 +8,7 @@ use super::super::{
 use super::row::Row;
 use super::{ImportSettings, Stop};
 use crate::io::{InputError, Records};
+use crate::market::Quantity;
 
 /// A log while it is read.
 pub(super) struct Draft<'a> {
@@ -83,30 +84,35 @@ impl Entries {
     }
 }
 
-/// The order of an execution, as far as that tells: its side, and that so much of it was filled. How much was ordered it does not.
-pub(super) fn order_of_fill(fill: &PaperFill) -> Option<PaperOrder> {
-    let mut order = PaperOrder::new(fill.order_id.as_deref()?, &fill.symbol, fill.side?, fill.place.clone());
-    order.filled = Some(fill.quantity);
-    Some(order)
-}
-
-/// Joins the orders that executions state, one an execution, into one an order: what was filled adds up, the first time counts.
-pub(super) fn join_orders(orders: Vec<PaperOrder>) -> Vec<PaperOrder> {
+/// Joins the orders that executions state, one an execution, into one an order: the first time counts, and filled is what the
+/// `fills` of it add up to, for some may have been taken back.
+pub(super) fn join_orders(orders: Vec<PaperOrder>, fills: &[PaperFill]) -> Vec<PaperOrder> {
     let mut joined: Vec<PaperOrder> = Vec::new();
     let mut numbers = HashMap::new();
     for order in orders {
         let key = (order.symbol.clone(), order.id.clone());
         match numbers.get(&key).copied().and_then(|at: usize| joined.get_mut(at)) {
             Some(known) => {
-                known.filled = known.filled.zip(order.filled).map(|(a, b)| a + b);
                 known.decided_at = [known.decided_at, order.decided_at].into_iter().flatten().min();
                 known.ended_at = known.ended_at.max(order.ended_at);
             }
             None => {
                 numbers.insert(key, joined.len());
-                joined.push(order);
+                joined.push(PaperOrder { filled: Some(Quantity::ZERO), ..order });
             }
         }
     }
+    for fill in fills {
+        let key = fill.order_id.clone().map(|id| (fill.symbol.clone(), id));
+        let order = key.and_then(|key| numbers.get(&key).copied()).and_then(|at| joined.get_mut(at));
+        if let Some(order) = order {
+            order.filled = order.filled.map(|filled| filled + fill.quantity);
+        }
+    }
     joined
+}
+
+/// The order of an execution, as far as that tells: its side. How much was ordered it does not.
+pub(super) fn order_of_fill(fill: &PaperFill) -> Option<PaperOrder> {
+    Some(PaperOrder::new(fill.order_id.as_deref()?, &fill.symbol, fill.side?, fill.place.clone()))
 }

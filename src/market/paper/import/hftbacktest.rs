@@ -57,7 +57,7 @@ fn order(row: &mut Row<'_>, symbol: &str, entries: &mut Entries) -> Result<(), S
         "3" => PaperStatus::Filled,
         "4" => PaperStatus::Cancelled,
         "6" => PaperStatus::Rejected,
-        other => PaperStatus::Other(other.to_owned()),
+        other => PaperStatus::of_word(other),
     });
     order.ended_at = row.time("exch_ns", NANOSECONDS)?;
     let executed = row.quantity("exec_qty")?.filter(|executed| executed.0 > 0);

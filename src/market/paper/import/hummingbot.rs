@@ -78,9 +78,10 @@ fn read(tables: &[&Records], draft: &mut Draft<'_>) -> Result<(), InputError> {
 }
 
 /// Adds the orders that only their fills tell of.
-fn of_fills(draft: &mut Draft<'_>, stated: Vec<PaperOrder>) {
+fn of_fills(draft: &mut Draft<'_>, mut stated: Vec<PaperOrder>) {
     let known: HashSet<String> = draft.log.orders.iter().map(|order| order.id.clone()).collect();
-    let stated = join_orders(stated.into_iter().filter(|order| !known.contains(&order.id)).collect());
+    stated.retain(|order| !known.contains(&order.id));
+    let stated = join_orders(stated, &draft.log.fills);
     if !stated.is_empty() {
         draft.clock(TimeColumn::DecidedAt, "timestamp less age", TimeMeaning::Submitted);
         let message = format!(
@@ -147,7 +148,7 @@ fn status_of(event: &str) -> PaperStatus {
         "OrderCancelled" => PaperStatus::Cancelled,
         "OrderFailure" => PaperStatus::Rejected,
         "OrderExpired" => PaperStatus::Expired,
-        other => PaperStatus::Other(other.to_lowercase()),
+        other => PaperStatus::of_word(other),
     }
 }
 

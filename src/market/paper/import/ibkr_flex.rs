@@ -58,7 +58,8 @@ fn read(tables: &[&Records], draft: &mut Draft<'_>) -> Result<(), InputError> {
     }
     // Orders of which there are executions only are what these say of them.
     let known: HashSet<String> = draft.log.orders.iter().map(|order| order.id.clone()).collect();
-    let of_executions = join_orders(stated.into_iter().filter(|order| !known.contains(&order.id)).collect());
+    stated.retain(|order: &PaperOrder| !known.contains(&order.id));
+    let of_executions = join_orders(stated, &draft.log.fills);
     if !of_executions.is_empty() {
         let message =
             format!("{} orders are known by their executions alone: not how much was ordered", of_executions.len());

@@ -23,7 +23,7 @@ mod trueup;
 use std::path::{Path, PathBuf};
 
 use super::{FindingKind, PaperFinding, PaperLog, SourcePlace};
-use crate::io::{InputError, Records, TimeFormat, hint_among, read_records, record_files, table_in};
+use crate::io::{InputError, Records, hint_among, read_records, record_files, table_in};
 use draft::Draft;
 
 pub use settings::{FeeRates, ImportSettings, NoRate, SymbolMap};
@@ -73,7 +73,7 @@ enum Stop {
 pub fn import(paths: &[PathBuf], settings: &ImportSettings) -> Result<PaperLog, InputError> {
     let mut source = Source::default();
     for path in paths {
-        source.add(path, settings)?;
+        source.add(path)?;
     }
     let mut log = import_records(&source.tables, settings, paths.first().map_or(Path::new("."), PathBuf::as_path))?;
     source.passed_over.into_iter().for_each(|finding| log.findings.add(finding));
@@ -156,14 +156,14 @@ struct Source {
 }
 
 impl Source {
-    fn add(&mut self, path: &Path, settings: &ImportSettings) -> Result<(), InputError> {
+    fn add(&mut self, path: &Path) -> Result<(), InputError> {
         if !path.is_dir() {
-            return self.add_file(path, settings);
+            return self.add_file(path);
         }
         // A log in the form of this program may have its whole market beside it.
         if let (Some(orders), Some(fills)) = (table_in(path, "orders")?, table_in(path, "fills")?) {
-            self.add_file(&orders, settings)?;
-            return self.add_file(&fills, settings);
+            self.add_file(&orders)?;
+            return self.add_file(&fills);
         }
         let files = record_files(path)?;
         if files.is_empty() {
@@ -175,16 +175,15 @@ impl Source {
             if ["quotes", "bars", "candles", "book", "depth"].iter().any(|market| name.starts_with(market)) {
                 self.pass_over(&file, "market data");
             } else {
-                self.add_file(&file, settings)?;
+                self.add_file(&file)?;
             }
         }
         Ok(())
     }
 
-    fn add_file(&mut self, path: &Path, settings: &ImportSettings) -> Result<(), InputError> {
+    fn add_file(&mut self, path: &Path) -> Result<(), InputError> {
         let wanted: Vec<&str> = FORMATS.iter().flat_map(|format| format.tables.iter().copied()).collect();
-        let time = TimeFormat { zone: settings.zone.unwrap_or_default(), ..TimeFormat::default() };
-        let mut file = read_records(path, &wanted, &time)?;
+        let mut file = read_records(path, &wanted)?;
         self.tables.append(&mut file.tables);
         if !file.passed_over.is_empty() {
             self.pass_over(path, &format!("tables that hold no orders or fills: {}", file.passed_over.join(", ")));

@@ -45,6 +45,11 @@ impl<'a> Row<'a> {
         self.record.records().table().is_some()
     }
 
+    /// Whether the table has that key, also where this row has no value for it.
+    pub fn has_key(&self, key: &str) -> bool {
+        self.record.records().has(key)
+    }
+
     /// Number of the row in its table, from 1.
     pub fn number(&self) -> usize {
         self.record.row()

@@ -9,7 +9,7 @@ use crate::sim2real::Timestamp;
 /// How a log writes a column of times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Written {
-    /// Integers since the Unix epoch, or texts with their zone; texts without one are in the zone given, or UTC.
+    /// Integers since the Unix epoch, or texts with their zone; texts without one are in the zone given.
     Contract,
     /// Integers since the Unix epoch in a unit [ns].
     Count(i64),
@@ -55,7 +55,7 @@ pub(super) fn stamp(text: &str, written: Written, zone: Option<Tz>) -> Result<St
             (Some(instant), _) | (None, Ok(instant)) => Ok(exact(instant)),
             _ => {
                 let what = "expected nanoseconds since 1970 or a time by RFC 3339";
-                in_zone(naive(text).ok_or_else(|| expected(what))?, zone.unwrap_or(Tz::UTC))
+                in_zone(naive(text).ok_or_else(|| expected(what))?, zone.ok_or(NoTime::NoZone)?)
             }
         },
         Written::Digits => digits(text, zone),
@@ -158,6 +158,15 @@ mod tests {
         {
             assert!(matches!(read(text, Written::Digits, new_york), Err(NoTime::Unreadable(_))), "{text}");
         }
+    }
+
+    #[test]
+    fn times_of_the_contract_without_a_zone_need_one() {
+        let (text, new_york) = ("2024-07-30 08:06:03.906000", Some(Tz::America__New_York));
+        assert_eq!(read(text, Written::Contract, None), Err(NoTime::NoZone));
+        assert_eq!(read(text, Written::Contract, new_york).as_deref(), Ok("2024-07-30T12:06:03.906Z"));
+        assert_eq!(read(&text.replace(' ', "T"), Written::Contract, new_york).as_deref(), Ok("2024-07-30T12:06:03.906Z"));
+        assert_eq!(read("2024-07-30 08:06:03+00:00", Written::Contract, new_york).as_deref(), Ok("2024-07-30T08:06:03Z"));
     }
 
     #[test]

@@ -97,14 +97,23 @@ fn fill(row: &mut Row<'_>, symbol: &str, entries: &mut Entries) -> Result<(), St
     fill.currency = row.owned("currency");
     fill.liquidity = row.text("liquidity").and_then(Liquidity::of_word);
     fill.fee = row.cash(exact(row, "fee_exact", "fee"))?;
-    let of_fee = |amount: Cash| Charge { amount, currency: None };
-    fill.charged = match row.cash(exact(row, "fee_charged_exact", "fee_charged"))? {
-        Some(amount) => Some(Charge { amount, currency: row.owned("fee_currency") }),
-        None => fill.fee.map(of_fee),
-    };
+    if row.has_key("fee_charged") {
+        let amount = row.cash(exact(row, "fee_charged_exact", "fee_charged"))?;
+        fill.charged = amount.map(|amount| Charge { amount, currency: row.owned("fee_currency") });
+    } else {
+        fill.fee = fill.fee.map(nearest_nano);
+        fill.charged = fill.fee.map(|amount| Charge { amount, currency: None });
+    }
     if row.text("origin") == Some(FillOrigin::OrderTotal.word()) {
         fill.origin = FillOrigin::OrderTotal;
     }
     entries.fills.push(fill);
     Ok(())
+}
+
+/// A fee as a backtest charges it, in whole 1e-9: what its table holds beyond that are the last bits of a floating-point number.
+fn nearest_nano(fee: Cash) -> Cash {
+    const NANO: i128 = 1_000_000_000;
+    let half = if fee.0 < 0 { -NANO / 2 } else { NANO / 2 };
+    Cash(fee.0.saturating_add(half) / NANO * NANO)
 }
