@@ -16,6 +16,16 @@ pub struct Met {
     pub reference: f64,
     /// Volume it can take part in [units]; infinite where the data do not know it.
     pub volume: f64,
+    /// What is displayed where it joins a queue [units]: 0 where it does not, infinite where the data do not know it.
+    pub displayed: f64,
+}
+
+impl Met {
+    /// What an order meets that joins no queue.
+    #[must_use]
+    pub fn at(book: Book, reference: f64, volume: f64) -> Self {
+        Self { book, reference, volume, displayed: 0.0 }
+    }
 }
 
 /// What mechanisms add to an execution; the default adds nothing.
@@ -25,6 +35,8 @@ pub struct ExecutionEffect {
     pub concession: f64,
     /// Orders are filled in whole multiples of it [units]; 0 where any quantity can be filled.
     pub lot: f64,
+    /// What stands ahead of an order that joins a queue beside what is displayed [units].
+    pub ahead: f64,
 }
 
 /// What is reported of an order, or of a position that is held.
@@ -245,9 +257,14 @@ impl Dynamics<Execution> for Execution {
     fn advance(&self, _tick: Tick, reports: &mut [Report], met: &[Met], orders: &[InFlight], effects: &[ExecutionEffect]) {
         for (((report, met), order), effect) in reports.iter_mut().zip(met).zip(orders).zip(effects) {
             let price = met.reference + order.side.sign() * effect.concession;
-            // What is held is held, however much is traded.
-            let quantity =
-                if order.role == Role::Holder { order.quantity } else { whole_lots(order.fillable(met.volume), effect.lot) };
+            let quantity = match order.role {
+                // What is held is held, however much is traded.
+                Role::Holder => order.quantity,
+                // Of what would have filled it, whoever stands ahead of an order that rests gets the first part.
+                Role::Taker | Role::Maker => {
+                    whole_lots((order.fillable(met.volume) - effect.ahead).max(0.0), effect.lot)
+                }
+            };
             *report = Report::of(order, price, quantity);
         }
     }

@@ -202,7 +202,10 @@ impl Stimulus<Execution> for OrderLog {
         let price = self.market.price.price_beside(book.as_ref(), tape, arriving.side, seen);
         let reference = price.unwrap_or(arriving.assumed);
         let volume = tape.volume_beside(book.as_ref(), arriving.side, seen);
-        Met { book: book.unwrap_or_else(|| Book::at_price(seen.end(), reference)), reference, volume }
+        let book = book.unwrap_or_else(|| Book::at_price(seen.end(), reference));
+        // What rests joins the best price of its own side.
+        let joined = book.opposite(arriving.side.opposite()).first().filter(|_| arriving.role == Role::Maker);
+        Met { displayed: joined.map_or(0.0, |level| level.size), ..Met::at(book, reference, volume) }
     }
 }
 

@@ -18,6 +18,7 @@ mod path;
 mod queue;
 mod resting;
 mod shown;
+mod standing;
 mod taken;
 
 use serde::{Deserialize, Serialize};
@@ -139,6 +140,7 @@ impl Venue {
         let still = Thetas::single(&[]);
         // Prices of an order that walks the book are averages over several trades, which lie between ticks.
         let averages = assembly.modelled().contains(&"book_walk");
+        let asks_queue = assembly.modelled().contains(&"queue_position");
         let at_plant = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Plant);
         let conceding: Vec<&'static str> = at_plant.map(|about| about.name).collect();
         let reporting = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Observation);
@@ -147,6 +149,7 @@ impl Venue {
             let run = assembly.run(&thetas, &still, setup.seed.child(symbol));
             let increments = setup.increments[number];
             let mut floor = Floor::new(number, increments, averages, conceding.len(), setup.rules, run);
+            floor.asks_queue = asks_queue;
             match setup.depth[number] {
                 Detail::Bars => floor.by_bars = true,
                 Detail::Quotes => {}

@@ -14,6 +14,7 @@ mod need;
 mod participation_cap;
 mod permanent_impact;
 mod propagator;
+mod queue_position;
 #[cfg(test)]
 mod schedule;
 mod sqrt_impact;
@@ -33,6 +34,7 @@ pub use lot_size::LotSize;
 pub use need::{Demanding, Lack, Need, needs};
 pub use participation_cap::ParticipationCap;
 pub use permanent_impact::PermanentImpact;
+pub use queue_position::QueuePosition;
 pub use sqrt_impact::SqrtImpact;
 pub use textbook_slippage::TextbookSlippage;
 pub use transient_impact::TransientImpact;
@@ -55,6 +57,7 @@ pub static MECHANISMS: Registry<Execution> = &[
     &TransientImpact,
     &VolatilitySlippage,
     &AdverseSelection,
+    &QueuePosition,
     &TextbookSlippage,
     &Commission,
     &BorrowFee,
@@ -74,5 +77,6 @@ pub static DEMANDING: &[&dyn Demanding] = &[
     &PermanentImpact,
     &TransientImpact,
     &VolatilitySlippage,
+    &QueuePosition,
     &TextbookSlippage,
 ];

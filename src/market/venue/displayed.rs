@@ -6,7 +6,6 @@ use crate::market::{
 use crate::sim2real::Timestamp;
 
 use super::floor::{Floor, Offer};
-use super::queue::Place;
 use super::shown::Shown;
 use super::taken::Taken;
 use super::{LimitFill, Resting, What};
@@ -83,15 +82,7 @@ impl Floor {
         };
         match reason {
             Some(reason) => self.end(k, at, reason),
-            None => self.join(k),
-        }
-    }
-
-    /// An order with a limit joins the end of the queue at its price.
-    fn join(&mut self, k: usize) {
-        let order = &self.resting[k];
-        if let (OrderKind::Limit { price }, true) = (order.kind, order.place == Place::default()) {
-            self.resting[k].place = Place::behind(self.shown.displayed_at(order.side, price), self.others.events());
+            None => self.join(k, at),
         }
     }
 
@@ -107,14 +98,14 @@ impl Floor {
             return;
         }
         let before = std::mem::replace(&mut self.shown, Shown::Quote(book));
-        for order in &mut self.resting {
+        for k in 0..self.resting.len() {
+            let order = &mut self.resting[k];
             if let OrderKind::Limit { price } = order.kind {
                 let (was, is) = (before.displayed_at(order.side, price), self.shown.displayed_at(order.side, price));
                 if was.is_finite() && is.is_finite() {
                     order.place.displayed(self.rules.queue, was, is);
                 } else if is.is_finite() {
-                    // The price has come into view: no more can be ahead than is there.
-                    order.place.displayed(self.rules.queue, is, is);
+                    self.come_into_view(k, is, at);
                 }
             }
         }

@@ -63,6 +63,8 @@ pub(in crate::market) struct Floor {
     pub(super) by_bars: bool,
     /// The data know the orders of others one by one.
     pub(super) by_order: bool,
+    /// A law has something to say of the queues that orders join.
+    pub(super) asks_queue: bool,
     pub(super) others: Others,
     /// Its hours, where they are known; else it never closes.
     pub auctions: Option<Auctions>,
@@ -99,6 +101,7 @@ impl Floor {
             ambiguous: 0,
             by_bars: false,
             by_order: false,
+            asks_queue: false,
             others: Others::default(),
             auctions: None,
             messages: 0,
@@ -127,7 +130,7 @@ impl Floor {
     pub fn charge(&mut self, held: &InFlight, mid: f64, now: Timestamp, mut seen: impl FnMut(usize, f64)) {
         let tick = self.tick(now);
         self.run.deliver(&[held.as_a(Role::Holder).arriving(now)]);
-        self.run.advance(tick, |_| Met { book: Book::at_price(now, mid), reference: mid, volume: f64::INFINITY });
+        self.run.advance(tick, |_| Met::at(Book::at_price(now, mid), mid, f64::INFINITY));
         self.run.observe_seen(tick.time, |law, reports| seen(law, reports.first().map_or(0.0, |report| report.fee)));
     }
 
@@ -197,7 +200,7 @@ impl Floor {
     /// Lets an order meet an offer: price, part filled, quantity and fee.
     fn meet(&mut self, arriving: &InFlight, offer: &Offer) -> (f64, f64, f64, f64) {
         let tick = self.tick(offer.at);
-        let met = Met { book: offer.book, reference: offer.reference, volume: offer.volume };
+        let met = Met::at(offer.book, offer.reference, offer.volume);
         self.run.deliver(&[*arriving]);
         let (concessions, mut before) = (&mut self.concessions, 0.0);
         self.run.advance_seen(
