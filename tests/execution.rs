@@ -54,6 +54,7 @@ fn order(k: i64) -> LoggedOrder {
         quantity: [20.0, 45.0, 75.0][(k % 3) as usize],
         decided_at: at(10 * k),
         kind: OrderType::Market,
+        seen_mid: None,
     }
 }
 

@@ -18,13 +18,15 @@ pub struct Met {
     pub volume: f64,
     /// What is displayed where it joins a queue [units]: 0 where it does not, infinite where the data do not know it.
     pub displayed: f64,
+    /// The mid that had been seen when it was decided, above what the mid was then [bps of it].
+    pub seen: f64,
 }
 
 impl Met {
     /// What an order meets that joins no queue.
     #[must_use]
     pub fn at(book: Book, reference: f64, volume: f64) -> Self {
-        Self { book, reference, volume, displayed: 0.0 }
+        Self { book, reference, volume, displayed: 0.0, seen: 0.0 }
     }
 }
 
@@ -62,6 +64,8 @@ pub struct Report {
     pub cost: f64,
     /// Part of the order that was filled, from 0 to 1.
     pub filled: f64,
+    /// The mid that had been seen when it was decided, above what the mid was then [bps of it].
+    pub seen: f64,
 }
 
 impl Default for Report {
@@ -78,6 +82,7 @@ impl Default for Report {
             fee: 0.0,
             cost: 0.0,
             filled: 0.0,
+            seen: 0.0,
         }
     }
 }
@@ -97,6 +102,7 @@ impl Report {
             fee: 0.0,
             cost: cost_bps(order.side, price, order.assumed, order.mid),
             filled: quantity / order.quantity,
+            seen: 0.0,
         }
     }
 
@@ -136,7 +142,8 @@ impl Observation for Report {
         match k {
             0 => self.cost,
             1 => fee_bps(self.fee, self.notional()).unwrap_or(0.0),
-            _ => self.filled,
+            2 => self.filled,
+            _ => self.seen,
         }
     }
 }
@@ -145,8 +152,13 @@ impl Observation for Report {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Execution;
 
-/// What is seen of an order: cost against the assumed price, fee, part filled.
-static CHANNELS: &[Channel] = &[Channel::new("cost", "bps"), Channel::new("fee", "bps"), Channel::new("filled", "")];
+/// What is seen of an order: cost against the assumed price, fee, part filled, and the mid it was decided on.
+static CHANNELS: &[Channel] = &[
+    Channel::new("cost", "bps"),
+    Channel::new("fee", "bps"),
+    Channel::new("filled", ""),
+    Channel::new("seen", "bps"),
+];
 
 impl Plant for Execution {
     type Command = InFlight;
@@ -188,6 +200,7 @@ impl Plant for Execution {
             effort: size(costs.iter().map(|cost| cost.abs()).collect()),
             output: if spread > 0.0 { spread } else { 1.0 },
             delay: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_delay()).collect()),
+            age: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_age()).collect()),
             ..Typical::default()
         }
     }
@@ -219,7 +232,7 @@ impl Execution {
 
     /// To what precision a log can tell a channel, in its unit: no fit of it can be better than that.
     ///
-    /// - `cost` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
+    /// - `cost` and `seen` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
     /// - `fee` [bps]: half a cent over the notional;
     /// - `filled` []: half a lot over the quantity.
     ///
@@ -228,7 +241,7 @@ impl Execution {
     pub fn resolution_of(recording: &Recording<OrderLog>, channel: &str) -> f64 {
         let instrument = recording.stimulus.instrument();
         let of = |order: &InFlight| match channel {
-            "cost" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
+            "cost" | "seen" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
             "fee" => Self::FEE_ROUNDING / (order.quantity * order.mid) * 1e4,
             "filled" => 0.5 * instrument.lot_size / order.quantity,
             _ => 0.0,
@@ -265,7 +278,7 @@ impl Dynamics<Execution> for Execution {
                     whole_lots((order.fillable(met.volume) - effect.ahead).max(0.0), effect.lot)
                 }
             };
-            *report = Report::of(order, price, quantity);
+            *report = Report { seen: met.seen, ..Report::of(order, price, quantity) };
         }
     }
 

@@ -70,6 +70,7 @@ mod run_page;
 #[cfg(feature = "io")]
 mod run_stream;
 mod session;
+mod shown_age;
 mod strategy;
 mod stream;
 #[cfg(feature = "io")]

@@ -16,6 +16,7 @@ use super::known::Known;
 use super::latency::Clocks;
 use super::line::{Line, RowKind};
 use super::mail::Mail;
+use super::mechanism::StaleQuotes;
 use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, Orders, Reference, Strategy};
@@ -81,6 +82,7 @@ fn detail(line: &Line<'_>) -> Detail {
 impl<'d> Session<'d> {
     pub(super) fn new(setup: &'d Backtest, feed: Feed<'d>) -> Self {
         let Settings { seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
+        let stale = StaleQuotes::delay_before(&setup.venue);
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
         let origin = feed.peek().unwrap_or_default();
         let (intrabar, limit_fill, queue) = (matching.intrabar, matching.limit_fill, matching.queue);
@@ -122,8 +124,8 @@ impl<'d> Session<'d> {
             trades_mark,
             transit: Transit::new(count),
             agenda,
-            direct: latencies.feed.is_none(),
-            clocks: Clocks::new(latencies, seed),
+            direct: latencies.feed.is_none() && stale == 0.0,
+            clocks: Clocks::new(latencies, stale, seed),
             timetable,
             known,
             daily: vec![Daily::default(); count],

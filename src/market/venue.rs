@@ -141,10 +141,10 @@ impl Venue {
         // Prices of an order that walks the book are averages over several trades, which lie between ticks.
         let averages = assembly.modelled().contains(&"book_walk");
         let asks_queue = assembly.modelled().contains(&"queue_position");
-        let at_plant = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Plant);
-        let conceding: Vec<&'static str> = at_plant.map(|about| about.name).collect();
-        let reporting = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Observation);
-        let charges = reporting.map(|about| charge_kind(about.name)).collect();
+        // In the order in which a run has their laws, which is that of where they act.
+        let acting = |site| assembly.mechanisms().filter(move |(row, form, _)| row.site(*form) == site);
+        let conceding: Vec<&'static str> = acting(Site::Plant).map(|(row, ..)| row.about().name).collect();
+        let charges = acting(Site::Observation).map(|(row, ..)| charge_kind(row.about().name)).collect();
         let floor = |(number, symbol): (usize, &&str)| {
             let run = assembly.run(&thetas, &still, setup.seed.child(symbol));
             let increments = setup.increments[number];

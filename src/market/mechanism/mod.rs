@@ -18,6 +18,7 @@ mod queue_position;
 #[cfg(test)]
 mod schedule;
 mod sqrt_impact;
+mod stale_quotes;
 mod textbook_slippage;
 mod transient_impact;
 mod volatility_slippage;
@@ -36,6 +37,7 @@ pub use participation_cap::ParticipationCap;
 pub use permanent_impact::PermanentImpact;
 pub use queue_position::QueuePosition;
 pub use sqrt_impact::SqrtImpact;
+pub use stale_quotes::StaleQuotes;
 pub use textbook_slippage::TextbookSlippage;
 pub use transient_impact::TransientImpact;
 pub use volatility_slippage::VolatilitySlippage;
@@ -59,6 +61,7 @@ pub static MECHANISMS: Registry<Execution> = &[
     &AdverseSelection,
     &QueuePosition,
     &TextbookSlippage,
+    &StaleQuotes,
     &Commission,
     &BorrowFee,
     &Funding,
