@@ -39,6 +39,8 @@ pub struct ExecutionEffect {
     pub lot: f64,
     /// What stands ahead of an order that joins a queue beside what is displayed [units].
     pub ahead: f64,
+    /// By how much own orders have moved the market up that an order which rests waits in [currency].
+    pub displaced: f64,
 }
 
 /// What is reported of an order, or of a position that is held.

@@ -7,7 +7,11 @@
 //!   waits. A resting order has a place in the queue at its price ([`QueueModel`]); it is filled when trades have used up
 //!   what stood ahead of it, or when others show a price at or beyond its own.
 //!
-//! A replayed history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only.
+//! A replayed history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only. Orders that
+//! take pay it. Orders with a limit or a trigger wait in the recorded market moved by it, in whole ticks, the nearest: after
+//! purchases one to sell is nearer to being filled, one to buy further, and what either stands behind is what the data display as far
+//! away from the market as it now is. Where that is another level, it joins the end of the queue there. On bars a bar is moved as
+//! the market stands when it opens. Strategies are shown what was recorded.
 
 mod auction;
 mod bars;
@@ -140,7 +144,9 @@ impl Venue {
         let still = Thetas::single(&[]);
         // Prices of an order that walks the book are averages over several trades, which lie between ticks.
         let averages = assembly.modelled().contains(&"book_walk");
-        let asks_queue = assembly.modelled().contains(&"queue_position");
+        let models = |names: &[&str]| assembly.modelled().iter().any(|name| names.contains(name));
+        let (asks_queue, asks_displacement) =
+            (models(&["queue_position"]), models(&["permanent_impact", "transient_impact"]));
         // In the order in which a run has their laws, which is that of where they act.
         let acting = |site| assembly.mechanisms().filter(move |(row, form, _)| row.site(*form) == site);
         let conceding: Vec<&'static str> = acting(Site::Plant).map(|(row, ..)| row.about().name).collect();
@@ -149,7 +155,7 @@ impl Venue {
             let run = assembly.run(&thetas, &still, setup.seed.child(symbol));
             let increments = setup.increments[number];
             let mut floor = Floor::new(number, increments, averages, conceding.len(), setup.rules, run);
-            floor.asks_queue = asks_queue;
+            (floor.asks_queue, floor.asks_displacement) = (asks_queue, asks_displacement);
             match setup.depth[number] {
                 Detail::Bars => floor.by_bars = true,
                 Detail::Quotes => {}
@@ -170,6 +176,7 @@ impl Floor {
     pub fn arrive(&mut self, orders: impl Iterator<Item = Resting>, at: Timestamp) {
         let first = self.resting.len();
         self.resting.extend(orders);
+        self.displace(at);
         let open = self.is_open();
         if !open || !self.by_bars {
             for k in first..self.resting.len() {

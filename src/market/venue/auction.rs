@@ -159,6 +159,7 @@ impl Floor {
             self.open_at(at, None);
         }
         if opens {
+            self.displace(at);
             for k in 0..self.resting.len() {
                 self.resting[k].place = Place::default();
                 self.meet_shown(k, at);
@@ -223,7 +224,7 @@ impl Floor {
     fn take_part(&mut self, k: usize, at: Timestamp, traded: Option<Traded>) {
         let order = self.resting[k];
         let (price, offer) = match traded {
-            Some(traded) => (Some(traded.price), Some(self.offer_traded(traded, at))),
+            Some(traded) => (Some(self.shown_at(traded.price)), Some(self.offer_traded(traded, at))),
             None => (self.touch_price(order.side), self.offer_shown(order.side, at)),
         };
         let (Some(price), Some(offer)) = (price, offer) else { return self.end(k, at, Reason::NoAuction) };

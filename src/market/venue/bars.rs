@@ -18,13 +18,15 @@ impl Floor {
         self.taken = Taken::of_bars();
         let at = bar.open_at;
         let offer = self.offer(bar, at, bar.open);
+        self.displace_by(at, bar.open.to_f64());
+        let open = self.shown_at(bar.open);
         for k in 0..self.resting.len() {
             let order = &mut self.resting[k];
             if order.from > at || order.tradable() <= Quantity::ZERO {
                 continue;
             }
-            order.follow(bar.open);
-            if order.waits() && order.set_off_by(bar.open) {
+            order.follow(open);
+            if order.waits() && order.set_off_by(open) {
                 order.set_off();
                 let id = order.id;
                 self.tell(id, at, super::What::SetOff);
@@ -32,9 +34,9 @@ impl Floor {
             let order = &self.resting[k];
             let takes = match order.kind {
                 OrderKind::Market => true,
-                OrderKind::Limit { .. } => order.accepts(bar.open),
+                OrderKind::Limit { .. } => order.accepts(open),
                 OrderKind::MarketOnOpen => first_of_session,
-                OrderKind::LimitOnOpen { .. } => first_of_session && order.accepts(bar.open),
+                OrderKind::LimitOnOpen { .. } => first_of_session && order.accepts(open),
                 _ => false,
             };
             self.meet_at(k, &offer, takes, first_of_session);
@@ -91,8 +93,12 @@ impl Floor {
         if !self.resting.iter().any(|order| order.from <= closes_for.unwrap_or(bar.open_at)) {
             return;
         }
+        // What came within the bar is not known in its order: it is moved as the market stood when it opened.
+        self.displace_by(bar.open_at, bar.open.to_f64());
         if self.awaits_open(bar.open_at) {
-            let way = self.way(bar);
+            let prices = [bar.open, bar.high, bar.low, bar.close].map(|price| self.shown_at(price));
+            let [open, high, low, close] = prices;
+            let way = self.way(&Bar { open, high, low, close, ..*bar });
             for leg in way.windows(2) {
                 self.walk(bar, leg[0], leg[1], at);
             }
@@ -142,7 +148,7 @@ impl Floor {
                 let id = order.id;
                 self.tell(id, at, super::What::SetOff);
             }
-            let offer = self.offer(bar, at, price);
+            let offer = self.offer(bar, at, self.recorded(price));
             match self.resting[k].kind {
                 OrderKind::Market => self.meet_at(k, &offer, true, false),
                 OrderKind::Limit { .. } if self.resting[k].accepts(price) && before.1 != self.resting[k].kind => {
@@ -214,7 +220,7 @@ impl Floor {
             if !on_close || order.from > by {
                 continue;
             }
-            if order.accepts(bar.close) {
+            if order.accepts(self.shown_at(bar.close)) {
                 self.take(k, &offer, order.tradable());
             }
             if self.resting[k].left > Quantity::ZERO {

@@ -17,7 +17,7 @@ impl Floor {
         if order.tradable() <= Quantity::ZERO {
             return;
         }
-        let Some(touch) = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok()) else {
+        let Some(touch) = self.touch_price(order.side) else {
             // Nothing to take: what cannot wait is over, the rest waits.
             return self.wait_or_end(k, at);
         };
@@ -59,7 +59,8 @@ impl Floor {
     /// What an order finds within its limit [units]. What was taken of it already is not there a second time, though a
     /// replayed market goes on to show it.
     fn takable(&self, order: &Resting) -> f64 {
-        (self.shown.takable(order.side, order.limit()) - self.taken.by(order.side)).max(0.0)
+        let limit = order.limit().map(|limit| self.recorded(limit));
+        (self.shown.takable(order.side, limit) - self.taken.by(order.side)).max(0.0)
     }
 
     /// Best price an order of `side` can take, and what is displayed there.
@@ -99,8 +100,10 @@ impl Floor {
         }
         let before = std::mem::replace(&mut self.shown, Shown::Quote(book));
         for k in 0..self.resting.len() {
+            let shift = self.shift;
             let order = &mut self.resting[k];
             if let OrderKind::Limit { price } = order.kind {
+                let price = price.minus(shift);
                 let (was, is) = (before.displayed_at(order.side, price), self.shown.displayed_at(order.side, price));
                 if was.is_finite() && is.is_finite() {
                     order.place.displayed(self.rules.queue, was, is);
@@ -121,6 +124,7 @@ impl Floor {
                 if order.side == change.side
                     && let OrderKind::Limit { price } = order.kind
                 {
+                    let price = price.minus(self.shift);
                     let was = book.size(order.side, price);
                     match change.action {
                         DepthAction::Set if price == change.price => {
@@ -150,6 +154,7 @@ impl Floor {
         if self.resting.is_empty() || !self.is_open() {
             return;
         }
+        self.displace(at);
         for k in 0..self.resting.len() {
             self.look_at(k, at);
         }
@@ -163,7 +168,7 @@ impl Floor {
         }
         match order.kind {
             OrderKind::Limit { price } => {
-                let crossed = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok());
+                let crossed = self.touch_price(order.side);
                 let Some(offer) =
                     crossed.filter(|touch| order.side.accepts(*touch, price)).and_then(|_| self.offer_at(price, at))
                 else {
@@ -199,6 +204,8 @@ impl Floor {
         if self.resting.is_empty() || !self.is_open() {
             return;
         }
+        self.displace(at);
+        let price = self.shown_at(price);
         for k in 0..self.resting.len() {
             let order = self.resting[k];
             if order.tradable() <= Quantity::ZERO {
@@ -242,9 +249,9 @@ impl Floor {
         self.sweep(at);
     }
 
-    /// The best price an order of `side` can take, which sets a stop of that side off.
+    /// The best price an order of `side` can take in the market it waits in, which sets a stop of that side off.
     pub(super) fn touch_price(&self, side: Side) -> Option<Price> {
-        self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok())
+        self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok()).map(|touch| self.shown_at(touch))
     }
 
     /// What an order of `side` can take now.

@@ -65,6 +65,10 @@ pub(in crate::market) struct Floor {
     pub(super) by_order: bool,
     /// A law has something to say of the queues that orders join.
     pub(super) asks_queue: bool,
+    /// A law has something to say of how far own orders have moved the market.
+    pub(super) asks_displacement: bool,
+    /// By how much the market in which orders wait is above the recorded one: whole ticks.
+    pub(super) shift: Price,
     pub(super) others: Others,
     /// Its hours, where they are known; else it never closes.
     pub auctions: Option<Auctions>,
@@ -102,6 +106,8 @@ impl Floor {
             by_bars: false,
             by_order: false,
             asks_queue: false,
+            asks_displacement: false,
+            shift: Price(0),
             others: Others::default(),
             auctions: None,
             messages: 0,
@@ -245,7 +251,8 @@ impl Floor {
             fee,
             queued_behind,
             row: offer.row,
-            band: offer.band,
+            band: offer.band.map(|price| self.shown_at(price)),
+            displaced: self.shift,
         };
         self.terms.extend_from_slice(&self.concessions);
         self.tell(id, offer.at, What::Filled(filled));
@@ -361,6 +368,7 @@ impl Floor {
         } else if (grows || price.is_some()) && !self.by_bars && self.is_open() {
             // What may now take does, and what must not is over.
             self.resting[k].place = Place::default();
+            self.displace(at);
             self.meet_shown(k, at);
         }
         self.sweep(at);

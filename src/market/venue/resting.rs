@@ -174,6 +174,8 @@ pub(in crate::market) struct Filled {
     pub queued_behind: f64,
     /// Row of the data that brought it about, counted among rows of their kind.
     pub row: usize,
-    /// Lowest and highest price the data show for the time of the fill.
+    /// Lowest and highest price the data show for the time of the fill, moved as own orders have moved the market.
     pub band: [Price; 2],
+    /// By how much they have.
+    pub displaced: Price,
 }

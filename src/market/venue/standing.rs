@@ -1,6 +1,6 @@
 //! Where orders that rest stand: what the laws of the plant have for them, beside what the data display.
 
-use crate::market::{ExecutionEffect, InFlight, Met, OrderKind, Role};
+use crate::market::{Book, ExecutionEffect, InFlight, Met, OrderKind, Price, Role};
 use crate::sim2real::{Tick, Timestamp};
 
 use super::floor::Floor;
@@ -18,6 +18,51 @@ impl Floor {
         whole
     }
 
+    /// A recorded price in the market that orders wait in, as own orders have moved it.
+    #[inline]
+    pub(super) fn shown_at(&self, recorded: Price) -> Price {
+        recorded.plus(self.shift)
+    }
+
+    /// The recorded price of which the market that orders wait in makes `price`.
+    #[inline]
+    pub(super) fn recorded(&self, price: Price) -> Price {
+        price.minus(self.shift)
+    }
+
+    /// Moves the market that orders wait in to where own orders have moved it by `at`, and lets those whose level is another
+    /// join it.
+    #[inline]
+    pub(super) fn displace(&mut self, at: Timestamp) {
+        if self.asks_displacement
+            && let Some(mid) = self.shown.mid()
+        {
+            self.displace_by(at, mid);
+        }
+    }
+
+    /// The same where the recorded price is `mid` [currency].
+    pub(super) fn displace_by(&mut self, at: Timestamp, mid: f64) {
+        if !self.asks_displacement || self.resting.is_empty() {
+            return;
+        }
+        // Laws say it in bps of the mid: any order would be told the same.
+        let order = InFlight { mid, ..self.resting[0].order };
+        let met = Met::at(Book::at_price(at, mid), mid, f64::INFINITY);
+        let shift = self.increments.whole_ticks(self.ask(&order, met, at).displaced);
+        if shift == self.shift {
+            return;
+        }
+        self.shift = shift;
+        for k in 0..self.resting.len() {
+            // Only those that have joined a queue; on bars there is none.
+            if self.resting[k].place != Place::default() {
+                self.resting[k].place = Place::default();
+                self.join(k, at);
+            }
+        }
+    }
+
     /// What stands ahead of order `k` beside the `displayed` [units] where it joins [units].
     fn beyond(&mut self, k: usize, displayed: f64, at: Timestamp) -> f64 {
         // A run without a law of queues has nothing to ask for.
@@ -31,7 +76,7 @@ impl Floor {
     pub(super) fn join(&mut self, k: usize, at: Timestamp) {
         let order = &self.resting[k];
         if let (OrderKind::Limit { price }, true) = (order.kind, order.place == Place::default()) {
-            let displayed = self.shown.displayed_at(order.side, price);
+            let displayed = self.shown.displayed_at(order.side, self.recorded(price));
             let beyond = self.beyond(k, displayed, at);
             self.resting[k].place = Place::behind(displayed, beyond, self.others.events());
         }
