@@ -220,6 +220,8 @@ fn what_takers_pay_is_no_cost_of_those_who_rest_and_only_positions_are_charged_f
                 "commission" | "lot_size" | "participation_cap" => [true, true, false],
                 "adverse_selection" | "queue_position" => [false, true, false],
                 "borrow_fee" | "funding" => [false, false, true],
+                // Here nothing says what was seen.
+                "stale_quotes" => [false; 3],
                 // No cost of its own: whoever comes later meets another book.
                 "command_delay" => continue,
                 _ => [true, false, false],

@@ -10,9 +10,9 @@ use std::sync::Arc;
 use market_scene::{Busy, event, fills, instrument, quantity, quotes, run_plan, settings, venue};
 use trueup::io::TwinFile;
 use trueup::market::{
-    Backtest, Execution, History, Latencies, Latency, Level, LogMarket, LogSettings, LoggedFill, LoggedOrder, MECHANISMS,
-    OrderLog, OrderType, Orders, PriceAssumption, Quotes, Record, Settings, Side, Strategy, Tape, Ticket, View,
-    execution_assembly, execution_recordings,
+    Backtest, Execution, History, Latencies, Latency, Level, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog,
+    OrderType, Orders, PriceAssumption, Quotes, Record, Settings, Side, Strategy, Tape, Ticket, View, execution_assembly,
+    execution_logs,
 };
 use trueup::sim2real::diagnose::{Diagnosis, Verdict, diagnose};
 use trueup::sim2real::{Assembly, Recording, Seed, Timestamp, check_mechanism};
@@ -175,7 +175,7 @@ fn simulated_clients_saw_quotes_of_one_latency_before() {
     for (name, age, room) in [("01_market_lat1ms_q50", 0.001, 0.001), ("02_market_lat250ms_q50", 0.25, 0.02)] {
         let Some(folder) = abides(name) else { continue };
         let twin = TwinFile::read(folder.join("twin.toml")).unwrap();
-        let log = execution_recordings(&twin, &[folder]).unwrap().remove(0);
+        let log = execution_logs(&twin, &[folder]).unwrap().remove(0);
         println!("{name}: shown age {:?}, notes {:?}", log.stimulus.shown_age(), log.stimulus.notes());
         if let Some(shown) = log.stimulus.shown_age() {
             assert!((shown - age).abs() <= room, "{name}: {shown}");

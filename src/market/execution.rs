@@ -155,12 +155,8 @@ impl Observation for Report {
 pub struct Execution;
 
 /// What is seen of an order: cost against the assumed price, fee, part filled, and the mid it was decided on.
-static CHANNELS: &[Channel] = &[
-    Channel::new("cost", "bps"),
-    Channel::new("fee", "bps"),
-    Channel::new("filled", ""),
-    Channel::new("seen", "bps"),
-];
+static CHANNELS: &[Channel] =
+    &[Channel::new("cost", "bps"), Channel::new("fee", "bps"), Channel::new("filled", ""), Channel::new("seen", "bps")];
 
 impl Plant for Execution {
     type Command = InFlight;
@@ -276,9 +272,7 @@ impl Dynamics<Execution> for Execution {
                 // What is held is held, however much is traded.
                 Role::Holder => order.quantity,
                 // Of what would have filled it, whoever stands ahead of an order that rests gets the first part.
-                Role::Taker | Role::Maker => {
-                    whole_lots((order.fillable(met.volume) - effect.ahead).max(0.0), effect.lot)
-                }
+                Role::Taker | Role::Maker => whole_lots((order.fillable(met.volume) - effect.ahead).max(0.0), effect.lot),
             };
             *report = Report { seen: met.seen, ..Report::of(order, price, quantity) };
         }

@@ -53,10 +53,12 @@ pub(super) fn shown_age(quotes: &Quotes, seen: &[(Timestamp, f64)]) -> ShownAge 
         }
     }
     let (explained, known) = (usize::try_from(best).unwrap_or_default(), seen.len());
-    if known < ENOUGH || known - timely < OTHERWISE || explained <= timely {
+    if quotes.is_empty() || known < ENOUGH || known - timely < OTHERWISE {
         ShownAge::Timely
     } else if (explained as f64) < EXPLAINED * known as f64 {
         ShownAge::Unclear { explained, known }
+    } else if explained <= timely {
+        ShownAge::Timely
     } else {
         ShownAge::Aged(0.5 * (within.0 + within.1) as f64 / Timestamp::NANOS as f64)
     }
@@ -121,7 +123,9 @@ mod tests {
             // Decisions are a hundredth of a second apart within their seconds.
             assert!((found - age as f64 / 1e9).abs() <= 0.0051, "{found}, not {age} ns");
         }
-        let ShownAge::Aged(found) = shown_age(&quotes(), &orders(SECOND / 4, 25)) else { panic!("four in a hundred are others") };
+        let ShownAge::Aged(found) = shown_age(&quotes(), &orders(SECOND / 4, 25)) else {
+            panic!("four in a hundred are others")
+        };
         assert!((found - 0.25).abs() <= 0.0051, "{found}");
     }
 
