@@ -44,7 +44,7 @@ impl Status {
     #[must_use]
     pub fn ended(reason: Reason) -> Self {
         match reason {
-            Reason::PostOnly | Reason::FillOrKill | Reason::MarketClosed => Self::Rejected,
+            Reason::PostOnly | Reason::FillOrKill | Reason::MarketClosed | Reason::Halted => Self::Rejected,
             Reason::TimeInForce => Self::Expired,
             _ => Self::Cancelled,
         }

@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
 
 use super::mechanism::charge_kind;
-use super::{AnotherFill, Book, ChargeKind, DepthBook, Execution, Increments, Quantity, Side};
+use super::{AnotherFill, Book, ChargeKind, DepthBook, Execution, Increments, Quantity, Side, WhileHalted};
 
 pub use path::Intrabar;
 pub use queue::QueueModel;
@@ -101,6 +101,8 @@ pub struct Matching {
     pub limit_fill: LimitFill,
     /// How the queue at a price moves.
     pub queue: QueueModel,
+    /// What becomes of orders that come in a halt.
+    pub halted: WhileHalted,
 }
 
 /// The floors of all instruments, and what their laws are called.

@@ -38,6 +38,7 @@ impl Session<'_> {
             ledger: &self.ledger,
             equity,
             hours: self.timetable.each(),
+            halts: self.timetable.halts(),
         };
         (view, &mut self.orders)
     }

@@ -3,7 +3,7 @@
 use crate::market::account::Ratio;
 use crate::market::{
     AnotherFill, Book, Condition, Execution, InFlight, Increments, Link, Met, OrderId, Price, Quantity, Reason, Reference,
-    Role, Side,
+    Role, Side, WhileHalted,
 };
 use crate::sim2real::{Run, Tick, Timestamp};
 
@@ -22,6 +22,7 @@ pub(in crate::market) struct Rules {
     pub intrabar: Intrabar,
     pub limit_fill: LimitFill,
     pub queue: QueueModel,
+    pub halted: WhileHalted,
     /// The first message's time is this of the run [ns]: laws count from it.
     pub origin: Timestamp,
 }
