@@ -11,8 +11,7 @@ use market_scene::{Busy, event, fills, instrument, quantity, quotes, run_plan, s
 use trueup::io::TwinFile;
 use trueup::market::{
     Backtest, Execution, History, Latencies, Latency, Level, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog,
-    OrderType, Orders, PriceAssumption, Quotes, Record, Settings, Side, Strategy, Tape, Ticket, View,
-    execution_logs,
+    OrderType, Orders, PriceAssumption, Quotes, Record, Settings, Side, Strategy, Tape, Ticket, View, execution_logs,
 };
 use trueup::sim2real::diagnose::{Diagnosis, Verdict, diagnose};
 use trueup::sim2real::{Assembly, Recording, Seed, Timestamp, check_mechanism};
@@ -172,12 +171,15 @@ fn abides(name: &str) -> Option<PathBuf> {
 
 #[test]
 fn simulated_clients_saw_quotes_of_one_latency_before() {
-    for (name, age, room) in [("01_market_lat1ms_q50", 0.001, 0.001), ("02_market_lat250ms_q50", 0.25, 0.02)] {
+    // In a millisecond hardly any quote changes, which tells of nothing.
+    for (name, age) in [("01_market_lat1ms_q50", None), ("02_market_lat250ms_q50", Some(0.25_f64))] {
         let Some(folder) = abides(name) else { continue };
         let twin = TwinFile::read(folder.join("twin.toml")).unwrap();
         let log = execution_logs(&twin, &[folder]).unwrap().remove(0);
         println!("{name}: shown age {:?}, notes {:?}", log.stimulus.shown_age(), log.stimulus.notes());
-        let shown = log.stimulus.shown_age().unwrap();
-        assert!((shown - age).abs() <= room, "{name}: {shown}");
+        match (log.stimulus.shown_age(), age) {
+            (Some(shown), Some(age)) => assert!((shown - age).abs() < 0.02, "{name}: {shown}"),
+            (shown, age) => assert_eq!(shown, age, "{name}"),
+        }
     }
 }
