@@ -7,10 +7,10 @@ mod market_scene;
 use market_scene::{Plan, event, fills, instrument, limit, of, quantity, quotes, settings, sized_quotes, stop, venue};
 use proptest::prelude::{Just, ProptestConfig, Strategy as Drawn, prop_assert, prop_assert_eq, prop_oneof, proptest};
 use trueup::market::{
-    Backtest, DepthAction, DepthChange, History, Instrument, News, Notice, OrderId, Orders, Price, Print, Record, Role,
-    Settings, Side, Strategy, Ticket, View,
+    AuditSettings, AuditVerdict, Backtest, BacktestError, DepthAction, DepthChange, History, Instrument, News, Notice, OrderId, Orders, Price, Print, Record, Role,
+    Settings, Side, Strategy, Ticket, View, audit,
 };
-use trueup::sim2real::{Parameter, Simulator, Timestamp};
+use trueup::sim2real::{Parameter, Seed, Simulator, Timestamp};
 
 const SECOND: i64 = Timestamp::NANOS;
 
@@ -22,13 +22,16 @@ fn traded() -> Instrument {
 }
 
 fn run(history: History, parts: &[(&str, &str, f64)], strategy: &mut dyn Strategy) -> Record {
+    backtest(history, parts).run(strategy).unwrap()
+}
+
+fn backtest(history: History, parts: &[(&str, &str, f64)]) -> Backtest {
     let settings = Settings { max_leverage: 1e3, ..settings() };
     let plain = venue(parts);
     // What moves back does so within 20 s.
     let recovery = |p: &Parameter| if p.name == "recovery" { 20.0 } else { p.nominal };
     let values: Vec<f64> = plain.parameters().iter().map(recovery).collect();
-    let backtest = Backtest::new(vec![traded()], vec![history], plain.with_values(&values), settings);
-    backtest.unwrap().run(strategy).unwrap()
+    Backtest::new(vec![traded()], vec![history], plain.with_values(&values), settings).unwrap()
 }
 
 /// Time, side and price of the fills of orders that rested.
@@ -194,6 +197,7 @@ proptest! {
         history in random_market(),
         law in prop_oneof![Just("linear"), Just("square_root"), Just("exponential")],
         bps in 1.0..5_000.0_f64,
+        audited in proptest::bool::weighted(0.2),
     ) {
         let name = if law == "exponential" { "transient_impact" } else { "permanent_impact" };
         let of = |parts: &[(&str, &str, f64)]| run(history.clone(), parts, &mut Active::default());
@@ -210,6 +214,12 @@ proptest! {
                 };
                 prop_assert!(within, "{:?} at {} in {:?}", fill.side, fill.price.to_f64(), why);
             }
+        }
+        if audited {
+            let backtest = backtest(history.clone(), &[(name, law, bps)]);
+            let make = |_: &[History]| -> Result<Box<dyn Strategy>, BacktestError> { Ok(Box::new(Active::default())) };
+            let found = audit(&backtest, make, AuditSettings { cuts: 5, seed: Seed(1) }, &|_, _| {}).unwrap();
+            prop_assert_eq!(found.verdict, AuditVerdict::Clean, "{}", found.summary);
         }
         let (bare, nothing) = (of(&[]), of(&[(name, law, 0.0)]));
         prop_assert_eq!(&bare.equity, &nothing.equity);

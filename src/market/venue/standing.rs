@@ -1,6 +1,6 @@
 //! Where orders that rest stand: what the laws of the plant have for them, beside what the data display.
 
-use crate::market::{Book, ExecutionEffect, InFlight, Met, OrderKind, Price, Role};
+use crate::market::{Book, ExecutionEffect, InFlight, Met, OrderKind, Price, Quantity, Role};
 use crate::sim2real::{Tick, Timestamp};
 
 use super::floor::Floor;
@@ -54,9 +54,9 @@ impl Floor {
             return;
         }
         self.shift = shift;
-        for k in 0..self.resting.len() {
-            // Only those that have joined a queue; on bars there is none.
-            if self.resting[k].place != Place::default() {
+        // On bars there are no queues, and an order that waits for its parent stands in none.
+        for k in 0..if self.by_bars { 0 } else { self.resting.len() } {
+            if self.resting[k].tradable() > Quantity::ZERO {
                 self.resting[k].place = Place::default();
                 self.join(k, at);
             }
