@@ -7,8 +7,8 @@ mod market_scene;
 use market_scene::{Plan, event, fills, instrument, limit, of, quantity, quotes, settings, sized_quotes, stop, venue};
 use proptest::prelude::{Just, ProptestConfig, Strategy as Drawn, prop_assert, prop_assert_eq, prop_oneof, proptest};
 use trueup::market::{
-    AuditSettings, AuditVerdict, Backtest, BacktestError, DepthAction, DepthChange, History, Instrument, News, Notice, OrderId, Orders, Price, Print, Record, Role,
-    Settings, Side, Strategy, Ticket, View, audit,
+    AuditSettings, AuditVerdict, Backtest, BacktestError, DepthAction, DepthChange, History, Instrument, News, Notice,
+    OrderId, Orders, Price, Print, Quantity, Record, Role, Settings, Side, Strategy, Ticket, TimeInForce, View, audit,
 };
 use trueup::sim2real::{Parameter, Seed, Simulator, Timestamp};
 
@@ -34,10 +34,11 @@ fn backtest(history: History, parts: &[(&str, &str, f64)]) -> Backtest {
     Backtest::new(vec![traded()], vec![history], plain.with_values(&values), settings).unwrap()
 }
 
-/// Time, side and price of the fills of orders that rested.
+/// Time, side and price of the fills of the limit order that `record` began with.
 fn made(record: &Record) -> Vec<(i64, Side, f64)> {
-    let resting = record.blotter.fills.iter().filter(|fill| fill.why.role == Role::Maker);
-    resting.map(|fill| (fill.filled_at.0, fill.side, fill.price.to_f64())).collect()
+    let limits = |id| record.blotter.order(id).unwrap().kind.limit().is_some();
+    let own = record.blotter.fills.iter().filter(|fill| limits(fill.order_id));
+    own.map(|fill| (fill.filled_at.0, fill.side, fill.price.to_f64())).collect()
 }
 
 fn sold(time: i64, price: f64, size: f64) -> Print {
@@ -59,7 +60,7 @@ fn a_sale_that_waits_is_nearer_after_purchases_and_a_purchase_further() {
     };
     let sale = |parts: &[_]| made(&run(rows(), parts, &mut after_buying(limit(Side::Sell, 5.0, 100.08))));
     assert_eq!(sale(&[]), []);
-    // The bid is 100.09 from the next quote on.
+    // The bid is 100.09 from the next quote on: it takes that, less half of what it moves back.
     assert_eq!(sale(&[PERMANENT]), [(2 * SECOND, Side::Sell, 100.08)]);
     let purchase = |price: f64, parts: &[_]| made(&run(rows(), parts, &mut after_buying(limit(Side::Buy, 5.0, price))));
     assert_eq!(purchase(99.95, &[]), [(5 * SECOND, Side::Buy, 99.95)]);
@@ -119,13 +120,60 @@ fn bars_are_moved_as_the_market_stands_when_they_open() {
     let plan = |resting| event(0).submit(Ticket::market(0, Side::Buy, quantity(10_000.0))).submit(resting);
     let made = |parts: &[_], resting| made(&run(history(), parts, &mut plan(resting)));
     let minute = market_scene::MINUTE;
-    assert_eq!(made(&[], limit(Side::Sell, 5.0, 100.1)), []);
-    assert_eq!(made(&[PERMANENT], limit(Side::Sell, 5.0, 100.1)), [(2 * minute, Side::Sell, 100.1)]);
+    assert_eq!(made(&[], limit(Side::Sell, 5.0, 100.09)), []);
+    assert_eq!(made(&[PERMANENT], limit(Side::Sell, 5.0, 100.09)), [(2 * minute, Side::Sell, 100.09)]);
     assert_eq!(made(&[], limit(Side::Buy, 5.0, 99.99)), [(2 * minute, Side::Buy, 99.99)]);
     assert_eq!(made(&[PERMANENT], limit(Side::Buy, 5.0, 99.99)), []);
     // A stop to buy is set off by what was bought, and pays what it finds moved: 0.10.
     let stopped = |parts: &[_]| fills(&run(history(), parts, &mut plan(stop(Side::Buy, 5.0, 100.05)))).len();
     assert_eq!((stopped(&[]), stopped(&[PERMANENT])), (1, 2));
+}
+
+#[test]
+fn a_limit_is_used_up_by_what_an_order_moves_itself() {
+    // The ask is 100.01. Ten ticks of room are what 20,000 pay in the mean: then the market is twice as far.
+    let rows: Vec<_> = (0..4).map(|k| (k * SECOND, 99.99, 1e6, 100.01, 1e6)).collect();
+    let of = |ticket| {
+        let record = run(sized_quotes(&rows), &[PERMANENT], &mut event(0).submit(ticket));
+        fills(&record).iter().map(|fill| fill.1).sum::<f64>()
+    };
+    assert_eq!(of(limit(Side::Buy, 15_000.0, 100.11)), 15_000.0);
+    assert_eq!(of(limit(Side::Buy, 90_000.0, 100.11)), 20_000.0);
+    let whole = |units| limit(Side::Buy, units, 100.11).working(TimeInForce::FillOrKill);
+    assert_eq!((of(whole(20_000.0)), of(whole(20_001.0))), (20_000.0, 0.0));
+}
+
+/// Trades as it is told, one thing an event, and is flat at the end.
+#[derive(Clone)]
+struct RoundTrip {
+    steps: Vec<(u8, u32, i64)>,
+    events: usize,
+}
+
+impl Strategy for RoundTrip {
+    fn name(&self) -> &str {
+        "round trip"
+    }
+    fn lookback(&self) -> usize {
+        1
+    }
+    fn on_event(&mut self, view: &View<'_>, orders: &mut Orders) {
+        let over = self.events.saturating_sub(self.steps.len());
+        if let Some((kind, units, ticks)) = self.steps.get(self.events) {
+            let (side, units) = ([Side::Buy, Side::Sell][usize::from(kind % 2)], f64::from(*units));
+            match kind / 2 {
+                0 => _ = orders.submit(Ticket::market(0, side, quantity(units))),
+                _ => _ = orders.submit(limit(side, units, 100.0 + 0.01 * *ticks as f64)),
+            }
+        } else if over == 1 {
+            view.orders(0).iter().for_each(|order| orders.cancel(order.id));
+        } else if over == 4 && view.position(0) != Quantity::ZERO {
+            let held = view.position(0);
+            let side = if held > Quantity::ZERO { Side::Sell } else { Side::Buy };
+            orders.submit(Ticket::market(0, side, held.abs()));
+        }
+        self.events += 1;
+    }
 }
 
 /// Quotes on both sides, and takes now and then.
@@ -224,5 +272,29 @@ proptest! {
         let (bare, nothing) = (of(&[]), of(&[(name, law, 0.0)]));
         prop_assert_eq!(&bare.equity, &nothing.equity);
         prop_assert_eq!(&bare.blotter.fills, &nothing.blotter.fills);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+    /// In a market that stands still nobody gains from what own orders move, be they market orders or limits, nearer or further.
+    #[test]
+    fn no_round_trip_gains_from_own_impact(
+        steps in proptest::collection::vec((0..4_u8, 1..9_000_u32, -40..41_i64), 1..25),
+        law in prop_oneof![Just("linear"), Just("square_root"), Just("exponential")],
+        bps in 100.0..6_000.0_f64,
+        depth in prop_oneof![Just(1e7), Just(2_000.0)],
+    ) {
+        let rows: Vec<_> = (0..steps.len() as i64 + 8).map(|k| (k * 3 * SECOND, 99.995, depth, 100.005, depth)).collect();
+        let name = if law == "exponential" { "transient_impact" } else { "permanent_impact" };
+        let settings = Settings { max_leverage: 1e6, ..settings() };
+        let plain = venue(&[(name, law, bps)]);
+        let recovery = |p: &Parameter| if p.name == "recovery" { 20.0 } else { p.nominal };
+        let values: Vec<f64> = plain.parameters().iter().map(recovery).collect();
+        let fine = Instrument { tick_size: 0.005, ..traded() };
+        let backtest = Backtest::new(vec![fine], vec![sized_quotes(&rows)], plain.with_values(&values), settings).unwrap();
+        let record = backtest.run(&mut RoundTrip { steps, events: 0 }).unwrap();
+        prop_assert_eq!(record.ledger.positions()[0].quantity, Quantity::ZERO);
+        prop_assert!(record.ledger.equity().unwrap() <= record.ledger.opening(), "{:?}", fills(&record));
     }
 }

@@ -8,16 +8,14 @@
 //!   what stood ahead of it, or when others show a price at or beyond its own.
 //!
 //! A replayed history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only. Orders that
-//! take pay it. Orders with a limit or a trigger wait in the recorded market moved by it, in whole ticks, the nearest: after
-//! purchases one to sell is nearer to being filled, one to buy further, and what either stands behind is what the data display as far
-//! away from the market as it now is. Where that is another level, it joins the end of the queue there. On bars a bar is moved as
-//! the market stands when it opens. Strategies are shown what was recorded.
+//! take pay it, and orders that wait do so in the market [as own orders have moved it](moved).
 
 mod auction;
 mod bars;
 mod by_order;
 mod displayed;
 mod floor;
+mod moved;
 mod path;
 mod queue;
 mod resting;
@@ -38,6 +36,7 @@ pub use queue::QueueModel;
 pub(super) use auction::Auctions;
 pub(super) use by_order::Others;
 pub(super) use floor::{Floor, Rules};
+use moved::Moved;
 pub(super) use resting::{Filled, Outcome, Resting, What};
 
 /// The price mechanisms start from where there are quotes. Where there are bars only it is the open.
@@ -146,18 +145,18 @@ impl Venue {
         let still = Thetas::single(&[]);
         // Prices of an order that walks the book are averages over several trades, which lie between ticks.
         let averages = assembly.modelled().contains(&"book_walk");
-        let models = |names: &[&str]| assembly.modelled().iter().any(|name| names.contains(name));
-        let (asks_queue, asks_displacement) =
-            (models(&["queue_position"]), models(&["permanent_impact", "transient_impact"]));
+        let asks_queue = assembly.modelled().contains(&"queue_position");
         // In the order in which a run has their laws, which is that of where they act.
         let acting = |site| assembly.mechanisms().filter(move |(row, form, _)| row.site(*form) == site);
         let conceding: Vec<&'static str> = acting(Site::Plant).map(|(row, ..)| row.about().name).collect();
         let charges = acting(Site::Observation).map(|(row, ..)| charge_kind(row.about().name)).collect();
+        let lasts = |name: &&str| matches!(*name, "permanent_impact" | "transient_impact");
+        let lasting: Vec<usize> = conceding.iter().enumerate().filter(|(_, name)| lasts(name)).map(|(law, _)| law).collect();
         let floor = |(number, symbol): (usize, &&str)| {
             let run = assembly.run(&thetas, &still, setup.seed.child(symbol));
             let increments = setup.increments[number];
             let mut floor = Floor::new(number, increments, averages, conceding.len(), setup.rules, run);
-            (floor.asks_queue, floor.asks_displacement) = (asks_queue, asks_displacement);
+            (floor.asks_queue, floor.moved) = (asks_queue, Moved::by_laws(lasting.clone()));
             match setup.depth[number] {
                 Detail::Bars => floor.by_bars = true,
                 Detail::Quotes => {}

@@ -262,11 +262,11 @@ impl Floor {
     fn take_part(&mut self, k: usize, at: Timestamp, traded: Option<Traded>) {
         let order = self.resting[k];
         let (price, offer) = match traded {
-            Some(traded) => (Some(self.shown_at(traded.price)), Some(self.offer_traded(traded, at))),
+            Some(traded) => (Some(traded.price), Some(self.offer_traded(traded, at))),
             None => (self.touch_price(order.side), self.offer_shown(order.side, at)),
         };
         let (Some(price), Some(offer)) = (price, offer) else { return self.end(k, at, Reason::NoAuction) };
-        if order.accepts(price) {
+        if self.moved.reaches(&order, price) {
             self.take(k, &offer, order.tradable());
         }
         if self.resting[k].left > Quantity::ZERO {

@@ -80,7 +80,7 @@ impl Floor {
         let Shown::Depth(book) = &mut self.shown else { return };
         let Some(left) = self.others.apply(event, book) else { return };
         for order in &mut self.resting {
-            let joined = order.limit().map(|limit| limit.minus(self.shift));
+            let joined = order.limit().map(|limit| self.moved.level(order.side, limit));
             if order.side == left.side && joined == Some(left.price) && left.since <= order.place.joined_after {
                 order.place.left_ahead(left.size);
             }

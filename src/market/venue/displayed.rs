@@ -21,9 +21,10 @@ impl Floor {
             // Nothing to take: what cannot wait is over, the rest waits.
             return self.wait_or_end(k, at);
         };
-        self.resting[k].follow(touch);
+        let moved = touch.plus(self.moved.by());
+        self.resting[k].follow(moved);
         if order.waits() {
-            if !self.resting[k].set_off_by(touch) {
+            if !self.resting[k].set_off_by(moved) {
                 return self.wait_or_end(k, at);
             }
             self.resting[k].set_off();
@@ -32,34 +33,41 @@ impl Floor {
         let order = self.resting[k];
         let takes = match order.kind {
             OrderKind::Market => true,
-            OrderKind::Limit { .. } => order.accepts(touch),
+            OrderKind::Limit { .. } => self.moved.reaches(&order, touch),
             _ => false,
         };
         if takes && order.condition == Condition::PostOnly {
             return self.end(k, at, Reason::PostOnly);
         }
         if takes {
-            // A market order takes whatever its size, as diagnosis has it; a limit order what is displayed within its limit.
-            let within = match order.kind {
-                OrderKind::Market => Quantity(i64::MAX),
-                _ => quantity_of(self.takable(&order)),
-            };
-            let whole = within >= order.tradable();
-            if (whole || order.time_in_force != TimeInForce::FillOrKill)
-                && let Some(offer) = self.offer_shown(order.side, at)
-            {
-                self.take(k, &offer, within);
-                let best = self.best_taken(order.side);
-                self.taken.from(order.side, best);
+            if let Some(offer) = self.offer_shown(order.side, at) {
+                self.take_shown(k, &offer);
             }
         }
         self.wait_or_end(k, at);
     }
 
+    /// Order `k` takes of what is displayed: a market order whatever its size, as diagnosis has it; a limit order what is there
+    /// within its limit; one to be filled whole, all or nothing.
+    pub(super) fn take_shown(&mut self, k: usize, offer: &Offer) {
+        let order = self.resting[k];
+        let within = match order.kind {
+            OrderKind::Market => Quantity(i64::MAX),
+            _ => quantity_of(self.takable(&order)),
+        };
+        let whole = order.time_in_force != TimeInForce::FillOrKill
+            || within >= order.tradable() && self.within_limit(k, offer, order.tradable()) >= order.tradable();
+        if whole {
+            self.take(k, offer, within);
+            let best = self.best_taken(order.side);
+            self.taken.from(order.side, best);
+        }
+    }
+
     /// What an order finds within its limit [units]. What was taken of it already is not there a second time, though a
     /// replayed market goes on to show it.
     fn takable(&self, order: &Resting) -> f64 {
-        let limit = order.limit().map(|limit| self.recorded(limit));
+        let limit = order.limit().map(|limit| limit.minus(self.moved.by()));
         (self.shown.takable(order.side, limit) - self.taken.by(order.side)).max(0.0)
     }
 
@@ -100,10 +108,9 @@ impl Floor {
         }
         let before = std::mem::replace(&mut self.shown, Shown::Quote(book));
         for k in 0..self.resting.len() {
-            let shift = self.shift;
             let order = &mut self.resting[k];
             if let OrderKind::Limit { price } = order.kind {
-                let price = price.minus(shift);
+                let price = self.moved.level(order.side, price);
                 let (was, is) = (before.displayed_at(order.side, price), self.shown.displayed_at(order.side, price));
                 if was.is_finite() && is.is_finite() {
                     order.place.displayed(self.rules.queue, was, is);
@@ -124,7 +131,7 @@ impl Floor {
                 if order.side == change.side
                     && let OrderKind::Limit { price } = order.kind
                 {
-                    let price = price.minus(self.shift);
+                    let price = self.moved.level(order.side, price);
                     let was = book.size(order.side, price);
                     match change.action {
                         DepthAction::Set if price == change.price => {
@@ -170,9 +177,9 @@ impl Floor {
             OrderKind::Limit { price } => {
                 let crossed = self.touch_price(order.side);
                 let Some(offer) =
-                    crossed.filter(|touch| order.side.accepts(*touch, price)).and_then(|_| self.offer_at(price, at))
+                    crossed.filter(|touch| self.moved.accepts(&order, *touch)).and_then(|_| self.offer_at(price, at))
                 else {
-                    return;
+                    return self.take_moved(k, at);
                 };
                 // What we took ourselves is shown on; nobody new is there.
                 if self.taken.by(order.side) > 0.0 && self.takable(&order) <= 0.0 {
@@ -182,7 +189,7 @@ impl Floor {
                 self.make(k, &offer, order.tradable());
             }
             _ if order.waits() => {
-                let Some(price) = self.touch_price(order.side) else { return };
+                let Some(price) = self.touch_price(order.side).map(|touch| touch.plus(self.moved.by())) else { return };
                 self.resting[k].follow(price);
                 if self.resting[k].set_off_by(price) {
                     self.meet_shown(k, at);
@@ -205,15 +212,15 @@ impl Floor {
             return;
         }
         self.displace(at);
-        let price = self.shown_at(price);
+        let moved = price.plus(self.moved.by());
         for k in 0..self.resting.len() {
             let order = self.resting[k];
             if order.tradable() <= Quantity::ZERO {
                 continue;
             }
             if order.waits() {
-                self.resting[k].follow(price);
-                if self.resting[k].set_off_by(price) {
+                self.resting[k].follow(moved);
+                if self.resting[k].set_off_by(moved) {
                     self.resting[k].set_off();
                     self.tell(order.id, at, What::SetOff);
                     self.meet_shown(k, at);
@@ -227,10 +234,10 @@ impl Floor {
                 continue;
             };
             // A trade that took from our own side says nothing of whoever rests on the other.
-            if print.aggressor == Some(order.side) || !order.side.accepts(price, limit) {
+            if print.aggressor == Some(order.side) || !self.moved.accepts(&order, price) {
                 continue;
             }
-            let reached = if price == limit {
+            let reached = if price == self.moved.level(order.side, limit) {
                 match (self.rules.limit_fill, &self.shown) {
                     // Without a book nobody knows what stands ahead: the price has to go beyond the limit.
                     (LimitFill::Through, Shown::Last(_)) => 0.0,
@@ -249,9 +256,9 @@ impl Floor {
         self.sweep(at);
     }
 
-    /// The best price an order of `side` can take in the market it waits in, which sets a stop of that side off.
+    /// The best price recorded that an order of `side` can take.
     pub(super) fn touch_price(&self, side: Side) -> Option<Price> {
-        self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok()).map(|touch| self.shown_at(touch))
+        self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok())
     }
 
     /// What an order of `side` can take now.

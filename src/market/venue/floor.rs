@@ -9,6 +9,7 @@ use crate::sim2real::{Run, Tick, Timestamp};
 
 use super::auction::Auctions;
 use super::by_order::Others;
+use super::moved::Moved;
 use super::queue::Place;
 use super::resting::{Filled, Outcome, Resting, What};
 use super::shown::Shown;
@@ -66,10 +67,8 @@ pub(in crate::market) struct Floor {
     pub(super) by_order: bool,
     /// A law has something to say of the queues that orders join.
     pub(super) asks_queue: bool,
-    /// A law has something to say of how far own orders have moved the market.
-    pub(super) asks_displacement: bool,
-    /// By how much the market in which orders wait is above the recorded one: whole ticks.
-    pub(super) shift: Price,
+    /// How far own orders have moved the market.
+    pub(super) moved: Moved,
     pub(super) others: Others,
     /// Its hours, where they are known; else it never closes.
     pub auctions: Option<Auctions>,
@@ -107,8 +106,7 @@ impl Floor {
             by_bars: false,
             by_order: false,
             asks_queue: false,
-            asks_displacement: false,
-            shift: Price(0),
+            moved: Moved::default(),
             others: Others::default(),
             auctions: None,
             messages: 0,
@@ -167,6 +165,7 @@ impl Floor {
             wanted = wanted.min(self.increments.whole_lots(Quantity::nearest(left.min(9e9)).unwrap_or(wanted)));
         }
         self.resting[k].met = true;
+        wanted = self.within_limit(k, offer, wanted);
         if wanted <= Quantity::ZERO {
             return;
         }
@@ -205,7 +204,7 @@ impl Floor {
     }
 
     /// Lets an order meet an offer: price, part filled, quantity and fee.
-    fn meet(&mut self, arriving: &InFlight, offer: &Offer) -> (f64, f64, f64, f64) {
+    pub(super) fn meet(&mut self, arriving: &InFlight, offer: &Offer) -> (f64, f64, f64, f64) {
         let tick = self.tick(offer.at);
         let met = Met::at(offer.book, offer.reference, offer.volume);
         self.run.deliver(&[*arriving]);
@@ -252,8 +251,8 @@ impl Floor {
             fee,
             queued_behind,
             row: offer.row,
-            band: offer.band.map(|price| self.shown_at(price)),
-            displaced: self.shift,
+            band: offer.band.map(|price| price.plus(self.moved.by())),
+            displaced: self.moved.by(),
         };
         self.terms.extend_from_slice(&self.concessions);
         self.tell(id, offer.at, What::Filled(filled));

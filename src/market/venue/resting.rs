@@ -130,11 +130,6 @@ impl Resting {
         order.average_daily_volume = order.average_daily_volume.map(|volume| volume * units);
         true
     }
-
-    /// Whether it may trade at `price`.
-    pub fn accepts(&self, price: Price) -> bool {
-        self.limit().is_none_or(|limit| self.side.accepts(price, limit))
-    }
 }
 
 /// What became of an order at the venue.

@@ -1,6 +1,6 @@
 //! Where orders that rest stand: what the laws of the plant have for them, beside what the data display.
 
-use crate::market::{Book, ExecutionEffect, InFlight, Met, OrderKind, Price, Quantity, Role};
+use crate::market::{ExecutionEffect, InFlight, Met, OrderKind, Role};
 use crate::sim2real::{Tick, Timestamp};
 
 use super::floor::Floor;
@@ -9,58 +9,13 @@ use super::queue::Place;
 impl Floor {
     /// What the laws have for an order that rests, which meets `met`: it is asked for, and nothing happens. Laws remember those
     /// alone who take.
-    fn ask(&mut self, order: &InFlight, met: Met, at: Timestamp) -> ExecutionEffect {
+    pub(super) fn ask(&mut self, order: &InFlight, met: Met, at: Timestamp) -> ExecutionEffect {
         // No message: those that follow keep their numbers.
         let tick = Tick { index: self.messages, time: at.seconds_since(self.rules.origin), step: 0.0 };
         self.run.deliver(&[order.as_a(Role::Maker)]);
         let mut whole = ExecutionEffect::default();
         self.run.advance_seen(tick, |_| met, |_, effects| whole = effects.first().copied().unwrap_or_default());
         whole
-    }
-
-    /// A recorded price in the market that orders wait in, as own orders have moved it.
-    #[inline]
-    pub(super) fn shown_at(&self, recorded: Price) -> Price {
-        recorded.plus(self.shift)
-    }
-
-    /// The recorded price of which the market that orders wait in makes `price`.
-    #[inline]
-    pub(super) fn recorded(&self, price: Price) -> Price {
-        price.minus(self.shift)
-    }
-
-    /// Moves the market that orders wait in to where own orders have moved it by `at`, and lets those whose level is another
-    /// join it.
-    #[inline]
-    pub(super) fn displace(&mut self, at: Timestamp) {
-        if self.asks_displacement
-            && let Some(mid) = self.shown.mid()
-        {
-            self.displace_by(at, mid);
-        }
-    }
-
-    /// The same where the recorded price is `mid` [currency].
-    pub(super) fn displace_by(&mut self, at: Timestamp, mid: f64) {
-        if !self.asks_displacement || self.resting.is_empty() {
-            return;
-        }
-        // Laws say it in bps of the mid: any order would be told the same.
-        let order = InFlight { mid, ..self.resting[0].order };
-        let met = Met::at(Book::at_price(at, mid), mid, f64::INFINITY);
-        let shift = self.increments.whole_ticks(self.ask(&order, met, at).displaced);
-        if shift == self.shift {
-            return;
-        }
-        self.shift = shift;
-        // On bars there are no queues, and an order that waits for its parent stands in none.
-        for k in 0..if self.by_bars { 0 } else { self.resting.len() } {
-            if self.resting[k].tradable() > Quantity::ZERO {
-                self.resting[k].place = Place::default();
-                self.join(k, at);
-            }
-        }
     }
 
     /// What stands ahead of order `k` beside the `displayed` [units] where it joins [units].
@@ -76,7 +31,7 @@ impl Floor {
     pub(super) fn join(&mut self, k: usize, at: Timestamp) {
         let order = &self.resting[k];
         if let (OrderKind::Limit { price }, true) = (order.kind, order.place == Place::default()) {
-            let displayed = self.shown.displayed_at(order.side, self.recorded(price));
+            let displayed = self.shown.displayed_at(order.side, self.moved.level(order.side, price));
             let beyond = self.beyond(k, displayed, at);
             self.resting[k].place = Place::behind(displayed, beyond, self.others.events());
         }
