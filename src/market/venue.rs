@@ -8,7 +8,7 @@
 //!   what stood ahead of it, or when others show a price at or beyond its own.
 //!
 //! A replayed history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only. Orders that
-//! take pay it, and orders that wait do so in the market [as own orders have moved it](moved).
+//! take pay it, and orders that wait do so in the market as own orders have moved it.
 
 mod auction;
 mod bars;

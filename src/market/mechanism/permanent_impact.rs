@@ -15,8 +15,8 @@ use super::need::{Demanding, Need, known};
 /// depends on the sum of what was traded alone. Of laws by which each order moves the price for good by a function of its own
 /// size, only the linear one is free of round trips that gain (Huberman & Stanzl).
 ///
-/// Own orders that rest wait in the market as it was moved: those to sell are nearer to being filled after purchases, those to buy
-/// further.
+/// Own orders that wait do so in the market as it was moved: after purchases those to buy are further from being filled, and those to
+/// sell nearer, where they take.
 ///
 /// The tape does not react: where it was recorded while the orders were sent, it shows what they left, and the law finds
 /// nothing besides.

@@ -19,7 +19,7 @@ use super::propagator::Propagator;
 /// as both forms are, and impact linear in the quantity, no round trip gains (Gatheral; Alfonsi, Schied & Slynko); a
 /// square-root law with exponential decay would let one gain, which is why there is none here.
 ///
-/// Own orders that rest wait in the market as far as it is still moved.
+/// Own orders that wait do so in the market as far as it is still moved.
 ///
 /// The tape does not react: where it was recorded while the orders were sent, it shows what they left, and the law finds
 /// nothing besides. Orders follow each other by when they meet the market.

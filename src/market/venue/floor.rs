@@ -290,11 +290,12 @@ impl Floor {
 
     /// What the fill of one order does to those it is linked with.
     fn settle_links(&mut self, id: OrderId, link: Link, quantity: Quantity, at: Timestamp) {
-        let mut over = Vec::new();
-        for order in self.resting.iter_mut().filter(|order| order.id != id) {
+        let (mut over, mut released) = (Vec::new(), Vec::new());
+        for (k, order) in self.resting.iter_mut().enumerate().filter(|(_, order)| order.id != id) {
             if order.link == (Link::ChildOf { parent: id }) {
                 // Children work for as much as their parent has filled.
                 order.released = (order.released + quantity).min(order.left);
+                released.push(k);
             } else if link != Link::Alone && order.link == link {
                 order.left = order.left - quantity;
                 order.released = (order.released - quantity).min(order.left).max(Quantity::ZERO);
@@ -305,6 +306,10 @@ impl Floor {
         }
         for id in over {
             self.tell(id, at, What::Ended(Reason::Linked));
+        }
+        if !self.by_bars && self.is_open() {
+            // From now on they stand in a queue.
+            released.into_iter().for_each(|k| self.join(k, at));
         }
     }
 
