@@ -279,7 +279,8 @@ fn a_position_is_not_charged_twice_where_word_of_a_fill_comes_late() {
     let order = |side, units| Ticket::market(0, side, quantity(units));
     let plan = event(0).submit(order(Side::Sell, 10.0)).at(2).submit(order(Side::Buy, 5.0));
     let charged = |response| {
-        let record = run_with(vec![quotes(&rows)], &[("borrow_fee", "", 0.36)], latencies(0.0, 0.0, response), plan.clone());
+        let record =
+            run_with(vec![quotes(&rows)], &[("borrow_fee", "held", 0.36)], latencies(0.0, 0.0, response), plan.clone());
         record.ledger.income()[0].charges.total().unwrap().to_f64()
     };
     // 0.001 a day of 1,000, and then of 500. What its owner does not know of yet is charged as it was.
