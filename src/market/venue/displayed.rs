@@ -39,10 +39,8 @@ impl Floor {
         if takes && order.condition == Condition::PostOnly {
             return self.end(k, at, Reason::PostOnly);
         }
-        if takes {
-            if let Some(offer) = self.offer_shown(order.side, at) {
-                self.take_shown(k, &offer);
-            }
+        if takes && let Some(offer) = self.offer_shown(order.side, at) {
+            self.take_shown(k, &offer);
         }
         self.wait_or_end(k, at);
     }
