@@ -224,12 +224,19 @@ proptest! {
         pauses in proptest::collection::vec((0..300_i64, 1..300_i64), 1..6),
         kind in 0..4_usize,
         refuse in any::<bool>(),
+        hours in any::<bool>(),
         audited in proptest::bool::weighted(0.1),
     ) {
         let halts = one_after_another(&pauses);
         let settings = halted(halts.clone(), if refuse { WhileHalted::Refuse } else { WhileHalted::Rest });
         let history = market(kind, &steps);
-        let of = |settings| Backtest::new(vec![instrument("A")], vec![history.clone()], venue(&[]), settings).unwrap();
+        // With days of its own or without, a market that never closes is halted alike.
+        let always = Arc::new(Calendar::built_in("always").unwrap());
+        let of = |settings| {
+            let calendars = if hours { vec![Some(Arc::clone(&always))] } else { Vec::new() };
+            let settings = Settings { calendars, ..settings };
+            Backtest::new(vec![instrument("A")], vec![history.clone()], venue(&[]), settings).unwrap()
+        };
         let backtest = of(settings);
         let record = backtest.run(&mut Busy::default()).unwrap();
         let within = |time: Timestamp| halts.iter().find(|halt| halt.from <= time && time < halt.to);

@@ -160,6 +160,57 @@ fn what_was_seen_elsewhere_is_said_and_left_out() {
     assert!(notes.contains("is not what the tape showed at any one age"), "{notes}");
 }
 
+const TWIN: &str =
+    "[twin]\nmodel = 'execution'\n[assumptions]\nprice = 'touch'\n[[instrument]]\nsymbol = 'A'\ntick_size = 0.01\n";
+
+/// A folder with what a run on stale quotes leaves, each of whose orders is written with what `seen` makes of it.
+fn folder(seen: fn(f64) -> (String, String)) -> tempfile::TempDir {
+    let log = log(&[("stale_quotes", "", 0.6)], |_| None);
+    let (market, quotes) = (&log.stimulus, log.stimulus.tape().quotes());
+    let mut orders = "order_id,symbol,decided_at,side,qty,type,seen_bid,seen_ask\n".to_owned();
+    let mut fills = "order_id,filled_at,qty,price,fee\n".to_owned();
+    for (k, order) in market.orders().iter().enumerate() {
+        let then = market.tape().mid(trueup::market::Seen::at(order.decided_at.plus_seconds(-0.6))).unwrap();
+        let (bid, ask) = seen(then);
+        orders += &format!("{k},A,{},{},10,market,{bid},{ask}\n", order.decided_at.0, order.side.word());
+        fills += &format!("{k},{},10,{},0\n", order.decided_at.0, order.assumed);
+    }
+    let mut rows = "ts,bid,bid_size,ask,ask_size\n".to_owned();
+    for quote in (0..quotes.len()).map(|k| quotes.all().get(k).unwrap()) {
+        rows += &format!("{},{},1e6,{},1e6\n", quote.time.0, quote.bid().unwrap(), quote.ask().unwrap());
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("twin.toml", TWIN), ("orders.csv", &orders), ("fills.csv", &fills), ("quotes.csv", &rows)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn what_was_seen_is_read_from_a_log_and_may_be_missing_but_not_be_words() {
+    let read = |seen| {
+        let folder = folder(seen);
+        let twin = TwinFile::read(folder.path().join("twin.toml")).unwrap();
+        execution_logs(&twin, &[folder.path().to_path_buf()])
+            .map(|mut logs| logs.remove(0))
+            .map_err(|error| error.to_string())
+    };
+    let both = |mid: f64| ((mid - 0.01).to_string(), (mid + 0.01).to_string());
+    let log = read(both).unwrap();
+    let shown = log.stimulus.shown_age().unwrap();
+    assert!(shown <= 0.6 && shown > 0.4, "{shown}");
+    let seen = &log.channel("seen").unwrap().samples;
+    assert!(seen.iter().flatten().any(|bps| bps.abs() > 0.5), "ticks of a bp each");
+    // A side that was empty, or crossed, is no quote.
+    let one_side = |mid: f64| (String::new(), mid.to_string());
+    let crossed = |mid: f64| ((mid + 0.01).to_string(), (mid - 0.01).to_string());
+    for seen in [one_side as fn(f64) -> (String, String), crossed] {
+        assert!(read(seen).unwrap().channel("seen").is_none());
+    }
+    let error = read(|_| ("soon".to_owned(), "late".to_owned())).unwrap_err();
+    assert!(error.contains("orders.csv: row 2, column `seen_bid`") && error.contains("found \"soon\""), "{error}");
+}
+
 fn abides(name: &str) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/market/abides").join(name);
     if !folder.is_dir() {
