@@ -3,14 +3,16 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 mod market_scene;
+mod ways_scene;
 
-use market_scene::{Plan, event, fills, instrument, limit, of, quantity, quotes, settings, sized_quotes, stop, venue};
+use market_scene::{Busy, Plan, event, fills, instrument, limit, of, quantity, quotes, settings, sized_quotes, stop, venue};
 use proptest::prelude::{Just, ProptestConfig, Strategy as Drawn, prop_assert, prop_assert_eq, prop_oneof, proptest};
 use trueup::market::{
     AuditSettings, AuditVerdict, Backtest, BacktestError, DepthAction, DepthChange, History, Instrument, News, Notice,
     OrderId, Orders, Price, Print, Quantity, Record, Role, Settings, Side, Strategy, Ticket, TimeInForce, View, audit,
 };
 use trueup::sim2real::{Parameter, Seed, Simulator, Timestamp};
+use ways_scene::same_every_way;
 
 const SECOND: i64 = Timestamp::NANOS;
 
@@ -277,6 +279,15 @@ proptest! {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
+    /// On streams, stopped and forked a run with all that is remembered of own orders comes to the same.
+    #[test]
+    fn it_is_the_same_every_way(history in random_market(), at_a_time in 1..9_usize) {
+        let parts = [("queue_position", "", 0.7), ("stale_quotes", "", 2.5), ("transient_impact", "exponential", 40_000.0)];
+        let backtest = backtest(history, &parts);
+        let record = backtest.run(&mut Busy::default()).unwrap();
+        same_every_way(&backtest, &record, &Busy::default(), at_a_time);
+    }
+
     /// In a market that stands still nobody gains from what own orders move, be they market orders or limits, nearer or further.
     #[test]
     fn no_round_trip_gains_from_own_impact(
