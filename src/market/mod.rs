@@ -27,6 +27,7 @@ mod desk;
 mod equity_curve;
 mod execution;
 mod feed;
+mod halt;
 mod history;
 #[cfg(feature = "io")]
 mod history_file;
@@ -65,6 +66,8 @@ mod run_calendar;
 #[cfg(feature = "io")]
 mod run_figures;
 #[cfg(feature = "io")]
+mod run_halts;
+#[cfg(feature = "io")]
 mod run_log;
 #[cfg(feature = "io")]
 mod run_needs;
@@ -73,6 +76,7 @@ mod run_page;
 #[cfg(feature = "io")]
 mod run_stream;
 mod session;
+mod shown_age;
 mod sources;
 mod strategy;
 mod stream;
@@ -111,6 +115,7 @@ pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
 pub use depth_book::DepthBook;
 pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
 pub use feed::{Arrival, Feed};
+pub use halt::{Halt, HaltSeen, HaltSummary, UnderHalt, WhileHalted};
 pub use history::{History, HistoryError};
 pub use instrument::Instrument;
 pub use known::OpenOrder;

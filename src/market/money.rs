@@ -305,6 +305,13 @@ impl Increments {
         price.0 % self.tick == 0
     }
 
+    /// The whole number of ticks nearest to `distance` [currency]; none of them where it is not a price could be.
+    #[must_use]
+    pub fn whole_ticks(self, distance: f64) -> Price {
+        let ticks = (distance * NANO / self.tick as f64).round();
+        Price::nearest(ticks * self.tick as f64 / NANO).map_or(Price(0), |near| Price(near.0 - near.0 % self.tick))
+    }
+
     /// One tick.
     #[must_use]
     pub fn tick(self) -> Price {

@@ -16,6 +16,7 @@ use super::known::Known;
 use super::latency::Clocks;
 use super::line::Line;
 use super::mail::Mail;
+use super::mechanism::StaleQuotes;
 use super::sources::RowKind;
 use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
@@ -85,6 +86,7 @@ fn detail(line: &Line<'_>) -> Detail {
 impl<'d> Session<'d> {
     pub(super) fn new(setup: &'d Backtest, feed: Feed<'d>) -> Self {
         let Settings { seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
+        let stale = StaleQuotes::delay_before(&setup.venue);
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
         let origin = feed.peek().unwrap_or_default();
         let (intrabar, limit_fill, queue) = (matching.intrabar, matching.limit_fill, matching.queue);
@@ -107,15 +109,18 @@ impl<'d> Session<'d> {
             symbols: setup.instruments.iter().map(|i| i.symbol.as_str()).collect(),
             increments: &setup.increments,
             depth,
-            rules: Rules { reference, intrabar, limit_fill, queue, origin },
+            rules: Rules { reference, intrabar, limit_fill, queue, halted: matching.halted, origin },
             seed,
         };
         let mut venue = Venue::new(&setup.venue, &venue);
         let conceding = venue.conceding.len();
         let count = setup.instruments.len();
-        let timetable = Timetable::new(setup.settings.calendars.iter().map(Option::as_deref), count);
-        for (k, _) in timetable.each().iter().enumerate().filter(|(_, hours)| hours.is_some()) {
-            venue.floors[k].auctions = Some(Auctions::of(feed.line(k)));
+        let calendars = setup.settings.calendars.iter().map(Option::as_deref);
+        let timetable = Timetable::new(calendars, &setup.settings.halts, count);
+        for k in (0..count).filter(|k| timetable.keeps(*k)) {
+            let has_hours = timetable.each().get(k).is_some_and(Option::is_some);
+            let of = if has_hours { Auctions::of } else { Auctions::always };
+            venue.floors[k].auctions = Some(of(feed.line(k)));
         }
         let mut agenda = Agenda::default();
         let (ledger, keeping) = Keeping::start(&setup.settings, count, origin, &mut agenda);
@@ -126,9 +131,9 @@ impl<'d> Session<'d> {
             trades_mark,
             transit: Transit::new(count),
             agenda,
-            direct: latencies.feed.is_none(),
+            direct: latencies.feed.is_none() && stale == 0.0,
             can_be_quiet: false,
-            clocks: Clocks::new(latencies, seed),
+            clocks: Clocks::new(latencies, stale, seed),
             timetable,
             known,
             daily: vec![Daily::default(); count],
@@ -266,7 +271,7 @@ impl<'d> Session<'d> {
         self.held.ambiguous_bars = self.venue.floors.iter().map(|floor| floor.ambiguous_bars()).sum();
         self.held.mean_equity = self.equity.mean();
         let data = self.feed.lines().iter().map(DataSeen::of).collect();
-        let outside = self.timetable.outside();
+        let (outside, halts) = (self.timetable.outside(), self.timetable.halts_seen());
         let account = self.keeping.map(|keeping| keeping.record).unwrap_or_default();
         Ok(Record {
             blotter: self.blotter,
@@ -275,6 +280,7 @@ impl<'d> Session<'d> {
             held: self.held,
             data,
             outside,
+            halts,
             account,
         })
     }

@@ -2,13 +2,14 @@
 
 use crate::sim2real::Timestamp;
 
+use super::halt::Halts;
 use super::hours::TradingHours;
 use super::known::Known;
 use super::rates::multiplied;
 use super::{
     Balance, Bar, Bracket, Calendar, Cash, Condition, CorporateAction, DepthBook, Hours, Increments, Instrument, Ledger,
     Link, Margin, OpenOrder, OrderId, OrderKind, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Terms,
-    Ticket,
+    Ticket, UnderHalt,
 };
 
 /// What brought an event about; in the order in which they come at one instant.
@@ -64,6 +65,7 @@ pub struct View<'a> {
     pub(super) ledger: &'a Ledger,
     pub(super) equity: Cash,
     pub(super) hours: &'a [Option<TradingHours<'a>>],
+    pub(super) halts: &'a [Halts<'a>],
 }
 
 impl<'a> View<'a> {
@@ -159,6 +161,12 @@ impl<'a> View<'a> {
     #[must_use]
     pub fn calendar(&self, instrument: usize) -> Option<&'a Calendar> {
         Some(self.hours.get(instrument)?.as_ref()?.calendar())
+    }
+
+    /// The halt an instrument is in now: when it ends is not known.
+    #[must_use]
+    pub fn halt(&self, instrument: usize) -> Option<UnderHalt<'a>> {
+        self.halts.get(instrument)?.under_way(self.event.time)
     }
 
     /// Our orders of an instrument that work, as far as is known, the oldest first.

@@ -72,6 +72,7 @@ impl Session<'_> {
             ledger: &self.ledger,
             equity,
             hours: self.timetable.each(),
+            halts: self.timetable.halts(),
         };
         (view, &mut self.orders)
     }
