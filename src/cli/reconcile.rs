@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::io::{InputError, OutputFolder, Overwrite, RunFile, table_in};
+use crate::io::{InputError, OutputFolder, Overwrite, RunFile, listed, table_in};
 use crate::market::paper::import::{ImportSettings, import};
 use crate::market::reconcile::{
     Checked, Compared, Histories, Lives, Reconciliation, Replay, ReplayError, Showing, clock_difference, lives, reconcile,
@@ -108,6 +108,12 @@ impl Reconcile {
         };
         let prepared = prepare_run(file)?;
         let symbols: Vec<&str> = prepared.backtest.instruments().iter().map(|i| i.symbol.as_str()).collect();
+        let others: Vec<&str> = paper.orders.iter().map(|order| order.symbol.as_str()).collect();
+        if let Some(first) = others.first().filter(|_| others.iter().all(|symbol| !symbols.contains(symbol))) {
+            let error = InputError::new(file.document().path(), format!("the run trades nothing of the paper log: {first}"));
+            let hint = format!("it has {}; name the run of the backtest, or map names with --symbols", listed(&symbols));
+            return Err(error.hint(hint).into());
+        }
         progress.tell("replaying", 0, 0);
         let own = self.replayed(&prepared, file, &symbols, backtest)?;
         let replayed = self.replayed(&prepared, file, &symbols, &paper)?;

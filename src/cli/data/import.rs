@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use chrono_tz::Tz;
 use clap::Args;
 
-use crate::io::{InputError, OutputFolder, Overwrite, did_you_mean, hint_among};
+use crate::io::{InputError, OutputFolder, Overwrite};
 use crate::market::paper::PaperLog;
-use crate::market::paper::import::{FORMATS, FeeRates, ImportSettings, SymbolMap, import};
+use crate::market::paper::import::import;
 
+use super::super::paper_log::LogArguments;
 use super::super::screen::Screen;
 use super::super::stop::{Outcome, Stop};
 use super::told::told;
@@ -28,19 +28,8 @@ pub(super) struct Import {
     /// Files of the log, or folders of which all files are read together
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Format of the log [default: told by its content]
-    #[arg(long, value_name = "FORMAT")]
-    format: Option<String>,
-    /// Names of symbols: a TOML file with a table [symbols], or a table with columns log_symbol and symbol
-    #[arg(long, value_name = "MAP")]
-    symbols: Option<PathBuf>,
-    /// Zone of times that have none, such as America/New_York
-    #[arg(long, value_name = "ZONE", value_parser = zone)]
-    zone: Option<Tz>,
-    /// What one unit of a currency in which fees were taken is worth in that of the price, such as BNB/USDT=612.5; fees
-    /// without a rate are kept apart [may be given several times]
-    #[arg(long = "fee-rate", value_name = "FROM/TO=RATE")]
-    rates: Vec<String>,
+    #[command(flatten)]
+    log: LogArguments,
     /// Folder to write orders.parquet, fills.parquet and findings.json into
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -57,7 +46,7 @@ const FILES: [&str; 3] = ["orders.parquet", "fills.parquet", "findings.json"];
 
 impl Import {
     pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
-        let settings = self.settings()?;
+        let settings = self.log.settings()?;
         let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
         if let Some(folder) = &self.out {
             OutputFolder::create(folder, overwrite)?.check_free(&FILES)?;
@@ -82,28 +71,6 @@ impl Import {
         screen.print(&text)?;
         Ok(Outcome::Done)
     }
-
-    fn settings(&self) -> Result<ImportSettings, InputError> {
-        let mut rates = FeeRates::default();
-        for rate in &self.rates {
-            rates.add(rate).map_err(|error| {
-                let text = error.to_string();
-                let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
-                InputError::new("--fee-rate", message).hint(hint)
-            })?;
-        }
-        if let Some(format) = self.format.as_ref().filter(|id| FORMATS.iter().all(|format| format.id != **id)) {
-            let ids = FORMATS.map(|format| format.id);
-            let error = InputError::new("--format", "there is no such format").found_text(format);
-            return Err(error.maybe_hint(hint_among(format, &ids)));
-        }
-        Ok(ImportSettings {
-            format: self.format.clone(),
-            symbols: self.symbols.as_deref().map(SymbolMap::read).transpose()?.unwrap_or_default(),
-            zone: self.zone,
-            rates,
-        })
-    }
 }
 
 fn write(log: &PaperLog, json: &str, mut output: OutputFolder) -> Result<Vec<PathBuf>, InputError> {
@@ -112,13 +79,4 @@ fn write(log: &PaperLog, json: &str, mut output: OutputFolder) -> Result<Vec<Pat
     output.table(fills, &log.fills_table())?;
     output.file(findings, json.as_bytes())?;
     output.finish()
-}
-
-/// A zone by its name in the IANA database.
-fn zone(text: &str) -> Result<Tz, String> {
-    text.parse().map_err(|_| {
-        let meant = did_you_mean(text, chrono_tz::TZ_VARIANTS.iter().map(|zone| zone.name()));
-        let hint = meant.map_or_else(|| "such as America/New_York".to_owned(), |meant| format!("did you mean {meant}?"));
-        format!("there is no such zone\n  hint: {hint}")
-    })
 }

@@ -24,7 +24,7 @@ pub fn listings(found: &Reconciliation, checked: &[Checked], orders: usize) -> V
         title,
         rows: Listing { heads: heads.iter().map(|head| (*head).to_owned()).collect(), rows },
     };
-    vec![
+    [
         listing("bounds", "Bounds", &["bound", "found", "at most", "holds", "order"], checked.iter().map(bound).collect()),
         listing(
             "gap",
@@ -72,6 +72,18 @@ pub fn listings(found: &Reconciliation, checked: &[Checked], orders: usize) -> V
             largest(&found.orders, orders).into_iter().map(order).collect(),
         ),
     ]
+    .map(|table| TitledListing { rows: told_columns(table.rows), ..table })
+    .into()
+}
+
+/// The table without columns in which there is nothing, or nothing but zeros, however many decimals these have.
+fn told_columns(table: Listing) -> Listing {
+    let nothing =
+        |cell: &String| cell.is_empty() || cell == "-" || cell.strip_prefix('+').is_some_and(|n| n.parse() == Ok(0.0));
+    let told: Vec<bool> =
+        (0..table.heads.len()).map(|k| table.rows.iter().filter_map(|row| row.get(k)).any(|cell| !nothing(cell))).collect();
+    let kept = |cells: Vec<String>| cells.into_iter().zip(&told).filter(|(_, told)| **told).map(|(cell, _)| cell).collect();
+    Listing { heads: kept(table.heads), rows: table.rows.into_iter().map(kept).collect() }
 }
 
 fn bound(checked: &Checked) -> Vec<String> {
