@@ -132,9 +132,12 @@ pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// When an order was decided [s], and how much of it there was.
+type Stamp = (f64, Option<Quantity>);
+
 /// The stamps of a log's orders, by what they trade and which way.
 struct Stamps<'a> {
-    of: HashMap<(&'a str, Side), Vec<(f64, Option<Quantity>)>>,
+    of: HashMap<(&'a str, Side), Vec<Stamp>>,
 }
 
 impl<'a> Stamps<'a> {
@@ -147,7 +150,7 @@ impl<'a> Stamps<'a> {
         Self { of }
     }
 
-    fn like<'b>(&'b self, order: &'b Life) -> &'b [(f64, Option<Quantity>)] {
+    fn like<'b>(&'b self, order: &'b Life) -> &'b [Stamp] {
         self.of.get(&(order.symbol.as_str(), order.side)).map_or(&[], Vec::as_slice)
     }
 
