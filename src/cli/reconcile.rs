@@ -11,8 +11,8 @@ use clap::Args;
 use crate::io::{InputError, OutputFolder, Overwrite, RunFile, listed, table_in};
 use crate::market::paper::import::{ImportSettings, import};
 use crate::market::reconcile::{
-    Checked, Compared, Histories, Lives, Reconciliation, Replay, ReplayError, Showing, clock_difference, lives, reconcile,
-    reconcile_page, replay,
+    Checked, Compared, Histories, Lives, Reconciliation, Replay, ReplayError, ReplayNote, Showing, clock_difference, lives,
+    reconcile, reconcile_page, replay,
 };
 use crate::market::{MoneyError, PreparedRun, explained, prepare_run};
 use crate::sim2real::Seed;
@@ -32,11 +32,12 @@ use super::stop::{Outcome, Stop};
 Examples:
   trueup reconcile --backtest out/run --paper logs/paper --run run.toml
   trueup reconcile --backtest out/run --paper tradesv3.sqlite --tolerance unmatched=0 --tolerance mean_price_bps=1
-  trueup reconcile --backtest out/run --paper fills.csv --tolerance tolerance.toml --out out/reconcile")]
+  trueup reconcile --backtest out/run --paper fills.csv --tolerance tolerance.toml --out out/reconcile
+  trueup reconcile --run run.toml --paper tradesv3.sqlite       # execution alone: the log's own orders in the simulator")]
 pub(super) struct Reconcile {
-    /// Folder that `trueup backtest --out` wrote
-    #[arg(long, value_name = "DIR")]
-    backtest: PathBuf,
+    /// Folder that `trueup backtest --out` wrote [default: the paper log's own orders as the simulator of --run executes them]
+    #[arg(long, value_name = "DIR", required_unless_present = "run")]
+    backtest: Option<PathBuf>,
     /// Files of the paper log, or a folder of which all files are read together
     #[arg(long, value_name = "LOG", required = true, num_args = 1..)]
     paper: Vec<PathBuf>,
@@ -79,9 +80,9 @@ impl Reconcile {
         let file = self.run.as_ref().map(RunFile::read).transpose()?;
         let progress = screen.progress();
         progress.tell("reading logs", 0, 0);
-        let backtest = backtest_log(&self.backtest)?;
+        let backtest = self.backtest.as_deref().map(backtest_log).transpose()?;
         let paper = lives(&import(&self.paper, &settings)?).map_err(|error| too_large(&self.paper[0], &error))?;
-        let found = self.found(&backtest, paper, file.as_ref(), &progress)?;
+        let found = self.found(backtest, paper, file.as_ref(), &progress)?;
         drop(progress);
         let checked = found.checked(&tolerance);
         self.tell(&found, &checked, overwrite, screen)?;
@@ -90,50 +91,42 @@ impl Reconcile {
 
     fn found(
         &self,
-        backtest: &Lives,
+        backtest: Option<Lives>,
         mut paper: Lives,
         file: Option<&RunFile>,
         progress: &Progress,
     ) -> Result<Reconciliation, Stop> {
-        let clock = clock_difference(&backtest.orders, &paper.orders);
-        if clock.is_a_zone || self.correct_clock {
-            let on = |order: crate::market::reconcile::Life| order.with_times(|at| clock.on_backtest(at));
-            paper.orders = paper.orders.into_iter().map(on).collect();
+        let clock = backtest.as_ref().map(|own| clock_difference(&own.orders, &paper.orders));
+        if let Some(clock) = clock.filter(|clock| clock.is_a_zone || self.correct_clock) {
+            paper.orders = paper.orders.into_iter().map(|order| order.with_times(|at| clock.on_backtest(at))).collect();
             paper.notes.push(format!("its times are moved by {:+.6} s onto the backtest's clock", -clock.offset));
         }
         let fails = |error: MoneyError| Stop::from(too_large(&self.paper[0], &error));
+        let seed = Seed(self.seed);
         let Some(file) = file else {
-            let compared = Compared { backtest, paper: &paper, replayed: None, showing: None, seed: Seed(self.seed) };
+            let backtest = &backtest.unwrap_or_default();
+            let compared = Compared { backtest, paper: &paper, replayed: None, showing: None, seed };
             return reconcile(&compared).map_err(fails);
         };
         let prepared = prepare_run(file)?;
         let symbols: Vec<&str> = prepared.backtest.instruments().iter().map(|i| i.symbol.as_str()).collect();
-        let others: Vec<&str> = paper.orders.iter().map(|order| order.symbol.as_str()).collect();
-        if let Some(first) = others.first().filter(|_| others.iter().all(|symbol| !symbols.contains(symbol))) {
-            let error = InputError::new(file.document().path(), format!("the run trades nothing of the paper log: {first}"));
-            let hint = format!("it has {}; name the run of the backtest, or map names with --symbols", listed(&symbols));
-            return Err(error.hint(hint).into());
-        }
+        check_symbols(file, &symbols, &paper)?;
         progress.tell("replaying", 0, 0);
-        let own = self.replayed(&prepared, file, &symbols, backtest)?;
         let replayed = self.replayed(&prepared, file, &symbols, &paper)?;
-        paper.notes.extend(
-            replayed
-                .notes
-                .iter()
-                .map(|note| format!("{} orders were not replayed: {} (first: {})", note.orders, note.why, note.first)),
-        );
-        let mut backtest = backtest.clone();
-        backtest.notes.extend(own.differs_from(&backtest.orders));
-        let histories = Histories::new(&symbols, prepared.backtest.histories());
-        let showing: &dyn Showing = &histories;
-        let compared = Compared {
-            backtest: &backtest,
-            paper: &paper,
-            replayed: Some(&replayed.orders),
-            showing: Some(showing),
-            seed: Seed(self.seed),
+        let note =
+            |note: &ReplayNote| format!("{} orders were not replayed: {} (first: {})", note.orders, note.why, note.first);
+        paper.notes.extend(replayed.notes.iter().map(note));
+        let backtest = match backtest {
+            Some(mut backtest) => {
+                let own = self.replayed(&prepared, file, &symbols, &backtest)?;
+                backtest.notes.extend(own.differs_from(&backtest.orders));
+                backtest
+            }
+            None => Lives { orders: replayed.orders.iter().flatten().cloned().collect(), notes: Vec::new() },
         };
+        let histories = Histories::new(&symbols, prepared.backtest.histories());
+        let (showing, executed) = (Some(&histories as &dyn Showing), Some(replayed.orders.as_slice()));
+        let compared = Compared { backtest: &backtest, paper: &paper, replayed: executed, showing, seed };
         reconcile(&compared).map_err(fails)
     }
 
@@ -168,6 +161,17 @@ impl Reconcile {
         }
         screen.print(&text)
     }
+}
+
+/// Refuses a run that has nothing of what the log traded.
+fn check_symbols(file: &RunFile, symbols: &[&str], paper: &Lives) -> Result<(), InputError> {
+    let Some(first) = paper.orders.first() else { return Ok(()) };
+    if paper.orders.iter().any(|order| symbols.contains(&order.symbol.as_str())) {
+        return Ok(());
+    }
+    let message = format!("the run trades nothing of the paper log: {}", first.symbol);
+    let hint = format!("it has {}; name the run of the backtest, or map names with --symbols", listed(symbols));
+    Err(InputError::new(file.document().path(), message).hint(hint))
 }
 
 /// The orders of a backtest, as it wrote them.
