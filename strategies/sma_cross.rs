@@ -9,12 +9,12 @@ use super::{Kind, StrategyError, check_weight, most_of_it, read};
 /// Holds an instrument while the mean of its last `fast` closes is above that of its last `slow`, and is flat (or short)
 /// while it is below. It trades when that changes, not to rebalance.
 ///
-/// The averages are kept as sums of prices, which are integers: each bar adds one close and takes one away, and the sums
-/// are exact after any number of bars. An instrument without bars is never traded.
+/// The averages are kept as one difference of sums of prices, which are integers: each bar adds closes and takes some away, and
+/// it is exact after any number of bars. An instrument without bars is never traded.
 #[derive(Debug, Clone)]
 pub struct SmaCross {
     parameters: Parameters,
-    sums: Vec<Sums>,
+    averages: Vec<Averages>,
 }
 
 pub(super) const KIND: Kind = Kind {
@@ -43,9 +43,9 @@ pub struct Parameters {
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    fast: i128,
-    slow: i128,
+struct Averages {
+    /// By how much the fast average is above the slow one, times the lengths of both.
+    ahead: i128,
     bars: usize,
 }
 
@@ -71,25 +71,24 @@ impl SmaCross {
             return value("slow", parameters.slow, "an average takes at most 1,000,000 bars");
         }
         check_weight(&KIND, parameters.weight)?;
-        Ok(Self { parameters, sums: Vec::new() })
+        Ok(Self { parameters, averages: Vec::new() })
     }
 
     /// Whether the fast average is above the slow one, once there are bars enough; none before, and where they are equal.
     #[inline]
     fn above(&mut self, instrument: usize, bars: &[Bar]) -> Option<bool> {
         let Parameters { fast, slow, .. } = self.parameters;
-        let sums = &mut self.sums[instrument];
-        let newest = i128::from(bars.last()?.close.0);
-        let leaving = |count: usize| bars.len().checked_sub(count + 1).map_or(0, |k| i128::from(bars[k].close.0));
-        sums.fast += newest - leaving(fast);
-        sums.slow += newest - leaving(slow);
-        sums.bars += 1;
-        if sums.bars < slow {
+        let averages = self.averages.get_mut(instrument)?;
+        let newest = bars.last()?.close.0;
+        let leaving = |count: usize| bars.len().checked_sub(count + 1).map_or(0, |k| bars[k].close.0);
+        // Sums of m and n closes are compared as n * fast and m * slow, without a division: what a bar changes of their difference.
+        let times = |count: usize, price: i64| count as i128 * i128::from(price);
+        averages.ahead += times(slow - fast, newest) - times(slow, leaving(fast)) + times(fast, leaving(slow));
+        averages.bars += 1;
+        if averages.bars < slow {
             return None;
         }
-        // fast / n > slow / m, without a division.
-        let (fast, slow) = (sums.fast * slow as i128, sums.slow * fast as i128);
-        (fast != slow).then_some(fast > slow)
+        (averages.ahead != 0).then_some(averages.ahead > 0)
     }
 }
 
@@ -110,8 +109,8 @@ impl Strategy for SmaCross {
         if event.kind != EventKind::Bar {
             return;
         }
-        if self.sums.len() < view.instruments().len() {
-            self.sums.resize(view.instruments().len(), Sums::default());
+        if self.averages.len() < view.instruments().len() {
+            self.averages.resize(view.instruments().len(), Averages::default());
         }
         let Some(above) = self.above(event.instrument, view.bars(event.instrument)) else { return };
         let coming = view.position(event.instrument) + view.working(event.instrument);
@@ -156,7 +155,7 @@ mod tests {
         let bars = bars(&closes);
         let parameters = Parameters { fast: 3, slow: 7, short: false, weight: 1.0 };
         let mut strategy = SmaCross::new(parameters).unwrap();
-        strategy.sums.resize(1, Sums::default());
+        strategy.averages.resize(1, Averages::default());
         for end in 1..=bars.len() {
             let window = &bars[end.saturating_sub(strategy.lookback())..end];
             let found = strategy.above(0, window);

@@ -317,7 +317,7 @@ fn what_is_charged_is_told_by_kind() {
     let day = 1_440;
     let all = (0..4).map(|k| bar(k * day, 100.0, 100.0, 1e3)).collect();
     let history = History::new(all, Default::default()).unwrap();
-    let parts = [("funding", "continuous", 1e-4), ("borrow_fee", "", 0.036), ("commission", "bps", 1.0)];
+    let parts = [("funding", "continuous", 1e-4), ("borrow_fee", "held", 0.036), ("commission", "bps", 1.0)];
     let account = of(&[fifty()]);
     let record = run(vec![history], &parts, account, event(0).submit(sell(0, 1.0)));
     let charges = record.ledger.income()[0].charges;

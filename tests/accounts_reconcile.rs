@@ -100,8 +100,12 @@ fn drawn_market(seed: u64) -> Backtest {
         rates: vec![Rate::Known([vec![(Timestamp(0), at(1.1))], rates].concat()), Rate::Constant(Price(6_789_123))],
         actions,
     };
-    let parts =
-        [("half_spread", "bps", 3.0), ("commission", "bps", 0.7), ("borrow_fee", "", 0.4), ("participation_cap", "", 0.2)];
+    let parts = [
+        ("half_spread", "bps", 3.0),
+        ("commission", "bps", 0.7),
+        ("borrow_fee", "held", 0.4),
+        ("participation_cap", "", 0.2),
+    ];
     let instruments: Vec<Instrument> = ["A", "B", "C"].map(market_scene::instrument).to_vec();
     Backtest::new(instruments, histories, venue(&parts), with(account)).unwrap()
 }

@@ -177,6 +177,7 @@ fn at_the_same_close(backtest: &Backtest, strategy: &mut dyn Strategy) -> Result
             row: 0,
             met: 0.0,
             band: [order.decision_price; 2],
+            displaced: Price(0),
             queued_behind: 0.0,
         },
     };

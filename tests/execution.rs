@@ -54,6 +54,7 @@ fn order(k: i64) -> LoggedOrder {
         quantity: [20.0, 45.0, 75.0][(k % 3) as usize],
         decided_at: at(10 * k),
         kind: OrderType::Market,
+        seen_mid: None,
     }
 }
 
@@ -217,8 +218,10 @@ fn what_takers_pay_is_no_cost_of_those_who_rest_and_only_positions_are_charged_f
             let touched = [Role::Taker, Role::Maker, Role::Holder].map(touches);
             let expected = match about.name {
                 "commission" | "lot_size" | "participation_cap" => [true, true, false],
-                "adverse_selection" => [false, true, false],
+                "adverse_selection" | "queue_position" => [false, true, false],
                 "borrow_fee" | "funding" => [false, false, true],
+                // Here nothing says what was seen.
+                "stale_quotes" => [false; 3],
                 // No cost of its own: whoever comes later meets another book.
                 "command_delay" => continue,
                 _ => [true, false, false],
@@ -310,6 +313,8 @@ fn forms_apply_where_the_data_know_what_they_need() {
     let bars = forms(&on_bars(PriceAssumption::BarClose));
     assert!(bars.contains(&"half_spread.bps".into()) && bars.contains(&"participation_cap.".into()));
     assert!(!bars.contains(&"half_spread.fraction".into()) && !bars.contains(&"book_walk.".into()));
+    // A log of market orders knows no queue.
+    assert!(!quoted.contains(&"queue_position.".into()) && forms(&planned()).contains(&"queue_position.".into()));
 }
 
 #[test]

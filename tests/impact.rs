@@ -124,6 +124,7 @@ fn log(impact: Impact, seed: u64) -> Recording<OrderLog> {
                 quantity: child.quantity,
                 decided_at: at(step),
                 kind: OrderType::Market,
+                seen_mid: None,
             });
             let filled_at = at(step) + 1_000;
             fills.push(LoggedFill { order_id: id, filled_at, quantity: child.quantity, price, fee: 0.0 });

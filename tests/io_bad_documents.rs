@@ -226,6 +226,14 @@ fn a_run_is_held_to_its_contract() {
     run.toml:12:1: names the file bas.csv, but there is no such file
       hint: did you mean bars.csv?
     ");
+    insta::assert_snapshot!(run("bars = \"bars.csv\"", "bars = \"spy/minute_2024.parquet\""), @"
+    run.toml:12:1: names the file spy/minute_2024.parquet, but there is no such file
+      hint: paths start from the folder of this document: there is no folder spy either
+    ");
+    insta::assert_snapshot!(run("bars = \"bars.csv\"", "bars = \"minute_2024.parquet\""), @"
+    run.toml:12:1: names the file minute_2024.parquet, but there is no such file
+      hint: paths start from the folder of this document: in the folder FOLDER there are bars.csv, run.toml
+    ");
     insta::assert_snapshot!(run("[[data]]\nsymbol = \"SPY\"", "[[data]]\nsymbol = \"SPI\""), @"
     run.toml:11:1: there is no [[instrument]] with the symbol `SPI`
       hint: did you mean `SPY`?

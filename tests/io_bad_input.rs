@@ -192,6 +192,19 @@ fn files_that_are_no_tables_are_refused() {
     none/a.csv: there is no such file
       hint: there is no folder none either
     ");
+    std::fs::create_dir(scene.0.path().join("few")).unwrap();
+    let missing = |name: &str| scene.shown(Table::read(scene.0.path().join("few").join(name)));
+    insta::assert_snapshot!(missing("quotes.csv"), @"
+    few/quotes.csv: there is no such file
+      hint: in the folder few nothing is there
+    ");
+    for name in ["a.csv", "b.csv", "c.csv", "d.csv", "e.csv", "f.csv", "g.csv"] {
+        std::fs::write(scene.0.path().join("few").join(name), "").unwrap();
+    }
+    insta::assert_snapshot!(missing("quotes.csv"), @"
+    few/quotes.csv: there is no such file
+      hint: in the folder few there are a.csv, b.csv, c.csv, d.csv, e.csv and 2 more
+    ");
     insta::assert_snapshot!(scene.shown(Table::read(scene.0.path())), @"
     FOLDER: expected a file, found a folder
       hint: name a file in it

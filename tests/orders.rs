@@ -252,7 +252,7 @@ fn what_is_held_is_charged_for_the_time_it_was_held() {
     let history = trueup::market::History::new(all, Default::default()).unwrap();
     let sell = |units: f64| Ticket::market(0, Side::Sell, quantity(units));
     let plan = event(0).submit(sell(1_000.0)).at(3).submit(sell(1_000.0));
-    let record = run(history, &[("borrow_fee", "", 0.36)], plan);
+    let record = run(history, &[("borrow_fee", "held", 0.36)], plan);
     // 0.36 a year of 360 days: 0.001 a day. 10,000 from minute 1 to minute 1,441, and 20,000 to minute 2,882.
     let minutes = f64::from(day as i32);
     let expected = 0.001 * (10_000.0 * (f64::from(1_441 - 1)) / minutes + 20_000.0 * f64::from(2_882 - 1_441) / minutes);

@@ -55,6 +55,17 @@ fn trades_use_up_the_queue_and_then_reach_the_order() {
 }
 
 #[test]
+fn the_exit_of_a_bracket_stands_behind_what_is_there_when_its_entry_fills() {
+    let rows: Vec<_> = (0..6).map(|t| (t * 10, 99.0, 101.0)).collect();
+    let bought = |time, size| print(time, 101.0, size, Side::Buy);
+    let history = quotes(&rows).with_prints(vec![bought(15, 60.0), bought(25, 30.0), bought(35, 13.0)]).unwrap();
+    let entry = Ticket::market(0, Side::Buy, quantity(5.0));
+    let record = run(history, &[], event(0).bracket(entry, at(101.0), at(90.0)));
+    // 100 are displayed: 90 are bought from those, and of 13 more three are left for us.
+    assert_eq!(fills(&record), [(0, 5.0, 101.0), (35, 3.0, 101.0)]);
+}
+
+#[test]
 fn an_order_inside_the_spread_has_nobody_ahead() {
     let history = quotes(&[(0, 99.0, 101.0), (10, 99.0, 101.0), (20, 99.0, 101.0)])
         .with_prints(vec![print(15, 100.0, 3.0, Side::Sell)])
@@ -268,7 +279,8 @@ fn a_position_is_not_charged_twice_where_word_of_a_fill_comes_late() {
     let order = |side, units| Ticket::market(0, side, quantity(units));
     let plan = event(0).submit(order(Side::Sell, 10.0)).at(2).submit(order(Side::Buy, 5.0));
     let charged = |response| {
-        let record = run_with(vec![quotes(&rows)], &[("borrow_fee", "", 0.36)], latencies(0.0, 0.0, response), plan.clone());
+        let record =
+            run_with(vec![quotes(&rows)], &[("borrow_fee", "held", 0.36)], latencies(0.0, 0.0, response), plan.clone());
         record.ledger.income()[0].charges.total().unwrap().to_f64()
     };
     // 0.001 a day of 1,000, and then of 500. What its owner does not know of yet is charged as it was.

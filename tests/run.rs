@@ -297,6 +297,10 @@ fn a_mechanism_that_lacks_its_data_is_an_error_before_the_run() {
     run.toml:16:1: `volatility_slippage` needs volatilities, and there are none of `XYZ`
       hint: add daily_volatility to [[instrument]], or more than a week of data: it is that of days that are over
     ");
+    insta::assert_snapshot!(with("name = 'queue_position'\nahead = 0.5", BARS), @"
+    run.toml:16:1: `queue_position` needs sizes displayed at a price, and there are none of `XYZ`
+      hint: add [[data]] with a book, or quotes that know sizes; on bars and trades alone nobody knows a queue
+    ");
     let traded = BARS.replace(",0\n", ",5\n");
     for mechanism in [
         "name = 'textbook_slippage'",

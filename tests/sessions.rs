@@ -357,3 +357,22 @@ fn a_maker_is_flat_before_the_close_of_a_half_day() {
     assert_eq!(ends_flat(keeping("nyse")), (true, true));
     assert!(!ends_flat(settings()).0, "without a calendar nobody knows of a close");
 }
+
+/// Short from Friday to Monday: of a year of 360 days 0.36 is 0.001 a day, and a lender counts Saturday and Sunday too.
+#[test]
+fn holding_is_charged_by_time_be_the_market_open_or_closed() {
+    let opens = ["2024-03-15T13:30:00Z", "2024-03-15T13:31:00Z", "2024-03-18T13:30:00Z", "2024-03-18T13:31:00Z"];
+    let charged_by = |form: &str, settings: Settings| {
+        let history = of(opens.map(|open| bar(open, MINUTE, [100.0, 100.0])).into());
+        let order = |side| Ticket::market(0, side, quantity(100.0));
+        let mut plan = event(0).submit(order(Side::Sell)).at(2).submit(order(Side::Buy));
+        let record = run_plan(vec![history], &[("borrow_fee", form, 0.36)], settings, &mut plan);
+        assert_eq!(fills(&record).iter().map(|fill| fill.0).collect::<Vec<_>>(), [at(opens[1]).0, at(opens[3]).0]);
+        record.ledger.income()[0].charges.borrow.to_f64()
+    };
+    let charged = |settings| charged_by("held", settings);
+    assert!((charged(keeping("nyse")) - 3.0 * 0.001 * 10_000.0).abs() < 1e-8, "{}", charged(keeping("nyse")));
+    assert_eq!(charged(keeping("nyse")), charged(settings()));
+    // Held at three midnights, the fee falls due three times, and is the same here.
+    assert!((charged_by("overnight", keeping("nyse")) - 30.0).abs() < 1e-8);
+}

@@ -144,7 +144,13 @@ impl<'a> Going<'a> {
     }
 
     fn finished(&self, mut session: Session<'_>, strategy: &mut dyn Strategy) -> Result<Record, InputError> {
-        self.to(&mut session, strategy, Moment::Events(usize::MAX))?;
+        loop {
+            let (done, of) = session.progress();
+            self.progress.tell("running", done, of.unwrap_or_default());
+            if !session.advance(strategy, EVENTS_A_TURN).map_err(|error| self.explained(&error))? {
+                break;
+            }
+        }
         session.finish().map_err(|error| self.explained(&error))
     }
 

@@ -14,7 +14,9 @@ mod diagnose;
 mod figures;
 mod fitted;
 mod mechanisms;
+mod paper_log;
 mod prove;
+mod reconcile;
 mod screen;
 mod stop;
 mod sweep;
@@ -56,6 +58,7 @@ enum Command {
     Diagnose(diagnose::Diagnose),
     Calibrate(calibrate::Calibrate),
     Backtest(backtest::Run),
+    Reconcile(reconcile::Reconcile),
     Audit(audit::Look),
     Sweep(sweep::Try),
     WalkForward(walk_forward::Walk),
@@ -99,6 +102,7 @@ impl Command {
             Self::Diagnose(command) => command.run(screen),
             Self::Calibrate(command) => command.run(screen),
             Self::Backtest(command) => command.run(screen),
+            Self::Reconcile(command) => command.run(screen),
             Self::Audit(command) => command.run(screen),
             Self::Sweep(command) => command.run(screen),
             Self::WalkForward(command) => command.run(screen),

@@ -138,6 +138,7 @@ fn metric_names() -> Vec<String> {
         held: crate::market::Held::default(),
         data: Vec::new(),
         outside: Vec::new(),
+        halts: Vec::new(),
         account: crate::market::AccountRecord::default(),
     };
     let value = Metrics::of(&empty).ok().and_then(|metrics| serde_json::to_value(&metrics).ok()).unwrap_or_default();

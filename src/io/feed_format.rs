@@ -90,9 +90,13 @@ impl FeedFormat {
 /// Holds the file that stands at `keys` of a document to exist.
 pub(super) fn check_file(document: &Document, keys: &[&str], named: &str) -> Result<(), InputError> {
     open(&document.resolve(named)).map(drop).map_err(|error| {
-        document
-            .error(keys, format!("names the file {named}, but {}", error.message))
-            .hint(error.hint.as_deref().unwrap_or("paths start from the folder of this document"))
+        let start = "paths start from the folder of this document";
+        let hint = match error.hint.map(String::from) {
+            Some(meant) if meant.starts_with("did you mean") => meant,
+            Some(there) => format!("{start}: {there}"),
+            None => start.to_owned(),
+        };
+        document.error(keys, format!("names the file {named}, but {}", error.message)).hint(hint)
     })
 }
 

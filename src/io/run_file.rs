@@ -14,6 +14,7 @@ use super::document::{Document, HINT};
 use super::error::InputError;
 use super::feed_format::{FeedFormat, check_file};
 use super::feed_rules::span;
+use super::halt_entry::{HaltEntry, HaltTable, halt_entries};
 use super::instrument_entry::{InstrumentEntry, check_instruments, check_terms};
 use super::quantity::{MechanismEntry, check_mechanisms};
 use super::rate_entry::{RateEntry, RateSource, RateTable, rate_entries};
@@ -33,6 +34,8 @@ pub struct RunFile {
     pub data: Vec<DataEntry>,
     /// `[[rate]]`: what foreign currencies are worth.
     pub rates: Vec<RateEntry>,
+    /// `[[halt]]`: when instruments do not trade.
+    pub halts: Vec<HaltEntry>,
     /// `kind` of `[strategy]`; its other keys are read by [`strategy_settings`](Self::strategy_settings).
     pub strategy: String,
     /// `[[mechanism]]`: what stands between decision and fill.
@@ -126,6 +129,8 @@ struct RunTable {
     data: Vec<DataTable>,
     #[serde(default)]
     rate: Vec<RateTable>,
+    #[serde(default)]
+    halt: Vec<HaltTable>,
     strategy: StrategyKind,
     #[serde(default)]
     mechanism: Vec<MechanismEntry>,
@@ -166,6 +171,11 @@ impl RunFile {
                 check_file(&run.document, &["rate", &index.to_string(), "file"], &path.to_string_lossy())?;
             }
         }
+        for (index, halt) in run.halts.iter().enumerate() {
+            if let HaltEntry::File { path, .. } = halt {
+                check_file(&run.document, &["halt", &index.to_string(), "file"], &path.to_string_lossy())?;
+            }
+        }
         let whence = |rate: RateEntry| match rate.source {
             RateSource::File { path, named, time, columns } => {
                 let path = run.document.resolve(&path);
@@ -174,16 +184,17 @@ impl RunFile {
             source => RateEntry { source, ..rate },
         };
         let rates = run.rates.into_iter().map(whence).collect();
+        let halts = run.halts.into_iter().map(|halt| halt.resolved(&run.document)).collect();
         let resolved = |data: DataEntry| {
             let snapshot = data.format.snapshot.as_ref().map(|path| run.document.resolve(path));
             DataEntry { path: run.document.resolve(&data.path), format: FeedFormat { snapshot, ..data.format }, ..data }
         };
-        Ok(Self { data: run.data.into_iter().map(resolved).collect(), rates, ..run })
+        Ok(Self { data: run.data.into_iter().map(resolved).collect(), rates, halts, ..run })
     }
 
     /// The run of a document; the files it names are neither looked for nor resolved.
     pub(super) fn parse(document: Document) -> Result<Self, InputError> {
-        let RunTable { run, instrument, data, rate, strategy, mechanism, sweep, .. } = document.parse()?;
+        let RunTable { run, instrument, data, rate, halt, strategy, mechanism, sweep, .. } = document.parse()?;
         if !run.cash.is_finite() || run.cash < 0.0 {
             let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
             return Err(error.found(run.cash).hint("it is what the run starts with"));
@@ -203,6 +214,7 @@ impl RunFile {
         check_instruments(&document, &instrument)?;
         check_terms(&document, &instrument)?;
         let rates = rate_entries(&document, &run.currency, rate, &instrument)?;
+        let halts = halt_entries(&document, halt, &instrument)?;
         check_mechanisms(&document, &mechanism)?;
         let data = data
             .into_iter()
@@ -219,7 +231,8 @@ impl RunFile {
         }
         let sweep = sweep.map(|table| SweepSection::of(&document, table)).transpose()?;
         let strategy = strategy.kind;
-        let run = Self { document, run, instruments: instrument, data, rates, strategy, mechanisms: mechanism, sweep };
+        let instruments = instrument;
+        let run = Self { document, run, instruments, data, rates, halts, strategy, mechanisms: mechanism, sweep };
         run.sweep.iter().try_for_each(|sweep| run.check_sweep(sweep))?;
         Ok(run)
     }
@@ -269,7 +282,7 @@ impl RunFile {
 }
 
 /// Reads an instant that need not be there.
-fn instant<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Timestamp>, D::Error> {
+pub(super) fn instant<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Timestamp>, D::Error> {
     let refused = |found: &str| {
         let hint = "such as \"2024-03-08T14:30:00Z\" (RFC 3339)";
         format!("invalid value: {found:?}, expected an instant{HINT}{hint}")

@@ -51,7 +51,10 @@ pub(super) fn open(path: &Path) -> Result<File, InputError> {
     })
 }
 
-/// A hint for a missing file: the one in its folder that may be meant, or that the folder is missing too.
+/// Most files of a folder that a hint names.
+const NAMED: usize = 5;
+
+/// A hint for a missing file: the one in its folder that may be meant, or else what is there; or that the folder is missing too.
 fn nearest_file(path: &Path) -> Option<String> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
@@ -60,8 +63,18 @@ fn nearest_file(path: &Path) -> Option<String> {
     let mut names: Vec<String> =
         std::fs::read_dir(folder).ok()?.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
     names.sort();
-    let meant = did_you_mean(&path.file_name()?.to_string_lossy(), &names)?;
-    Some(format!("did you mean {}?", folder.join(meant).display()))
+    if let Some(meant) = did_you_mean(&path.file_name()?.to_string_lossy(), &names) {
+        return Some(format!("did you mean {}?", folder.join(meant).display()));
+    }
+    let there = match names.len() {
+        0 => "nothing is there".to_owned(),
+        count => {
+            let more = if count > NAMED { format!(" and {} more", count - NAMED) } else { String::new() };
+            names.truncate(NAMED);
+            format!("there are {}{more}", names.join(", "))
+        }
+    };
+    Some(format!("in the folder {} {there}", folder.display()))
 }
 
 /// All bytes of a file.

@@ -5,10 +5,13 @@ use std::sync::Arc;
 use crate::sim2real::{Assembly, Seed, Timestamp};
 
 use super::blotter::Blotter;
-use super::line::{Line, RowKind};
+use super::halt::check_halts;
+use super::line::Line;
+use super::sources::RowKind;
 use super::{
-    Account, AccountRecord, Calendar, Cash, DataNotes, Execution, Feed, History, Increments, Instrument, Latencies,
-    LatencyError, Ledger, LedgerError, Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy, StreamError,
+    Account, AccountRecord, Calendar, Cash, DataNotes, Execution, Feed, Halt, HaltSeen, History, Increments, Instrument,
+    Latencies, LatencyError, Ledger, LedgerError, Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy,
+    StreamError,
 };
 
 /// A backtest, as it was set up.
@@ -42,6 +45,8 @@ pub struct Settings {
     /// When the market of each instrument is open, in their order. Instruments without a calendar, as those behind the last
     /// here, trade whenever there are data, in days of UTC.
     pub calendars: Vec<Option<Arc<Calendar>>>,
+    /// When instruments do not trade within their sessions.
+    pub halts: Vec<Halt>,
     /// How the account is kept; none for cash and prices in one currency, and nothing that happens to what is held.
     pub account: Option<Arc<Account>>,
 }
@@ -50,9 +55,9 @@ impl Settings {
     /// No borrowing: the sum of positions stays within the equity.
     #[must_use]
     pub fn with_cash(cash: Cash) -> Self {
-        let (matching, latencies, calendars) = Default::default();
+        let (matching, latencies, calendars, halts) = Default::default();
         let (seed, max_leverage, reference, equity_every, account) = (Seed::default(), 1.0, None, None, None);
-        Self { cash, seed, max_leverage, reference, matching, latencies, equity_every, calendars, account }
+        Self { cash, seed, max_leverage, reference, matching, latencies, equity_every, calendars, halts, account }
     }
 }
 
@@ -86,6 +91,20 @@ pub enum BacktestError {
     /// A model of queues that cannot be.
     #[error("the queue is to move by {0}\nhint: the exponent is a number above 0; 1 is in proportion")]
     Queue(QueueModel),
+    /// A halt that cannot be.
+    #[error("the halt of {symbol} from {from}: {what}\nhint: {hint}")]
+    Halt {
+        /// Its number among the halts, from 0.
+        number: usize,
+        /// Symbol of the instrument.
+        symbol: String,
+        /// When it begins.
+        from: Timestamp,
+        /// What is wrong with it.
+        what: String,
+        /// What to do about it.
+        hint: &'static str,
+    },
     /// A latency that cannot be.
     #[error(transparent)]
     Latency(#[from] LatencyError),
@@ -217,6 +236,8 @@ pub struct Record {
     /// Of each instrument, rows from outside the sessions of its calendar, which no order met; none where it has no calendar,
     /// and nothing at all where no instrument has one.
     pub outside: Vec<Option<usize>>,
+    /// What it saw of its halts, in the order in which it names them.
+    pub halts: Vec<HaltSeen>,
     /// Corporate actions and margin calls.
     pub account: AccountRecord,
 }
@@ -297,6 +318,7 @@ impl Backtest {
         if !settings.matching.queue.is_possible() {
             return Err(BacktestError::Queue(settings.matching.queue));
         }
+        check_halts(&settings.halts, &instruments)?;
         let increments = instruments
             .iter()
             .map(|i| Increments::of(i).map_err(|error| BacktestError::Money { place: i.symbol.clone(), error }))
@@ -369,7 +391,7 @@ impl Backtest {
     /// If an amount overflows, or a mechanism gives a price no market has.
     pub fn run(&self, strategy: &mut dyn Strategy) -> Result<Record, BacktestError> {
         let mut session = self.start();
-        while session.step(strategy)?.is_some() {}
+        while session.advance(strategy, usize::MAX)? {}
         session.finish()
     }
 }

@@ -44,7 +44,7 @@ impl Status {
     #[must_use]
     pub fn ended(reason: Reason) -> Self {
         match reason {
-            Reason::PostOnly | Reason::FillOrKill | Reason::MarketClosed => Self::Rejected,
+            Reason::PostOnly | Reason::FillOrKill | Reason::MarketClosed | Reason::Halted => Self::Rejected,
             Reason::TimeInForce => Self::Expired,
             _ => Self::Cancelled,
         }
@@ -162,8 +162,11 @@ pub struct Why {
     pub row: usize,
     /// Open or mid it met [currency].
     pub met: f64,
-    /// Lowest and highest price the data show for that time: where it might have been filled at best and at worst.
+    /// Lowest and highest price the data show for that time, moved by `displaced`: where it might have been filled at best and at
+    /// worst.
     pub band: [Price; 2],
+    /// By how much own orders had moved the market up in which it waited; 0 without a law that says so.
+    pub displaced: Price,
     /// What stood ahead of it when it joined the queue [units]; 0 where it took.
     pub queued_behind: f64,
 }

@@ -114,6 +114,7 @@ impl Session<'_> {
             row: filled.row,
             met: filled.mid,
             band: filled.band,
+            displaced: filled.displaced,
             queued_behind: filled.queued_behind,
         };
         self.blotter.fills.push(Fill {

@@ -11,6 +11,8 @@ use super::{DepthAction, DepthChange, Increments, Level, Price, Side};
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthBook {
     tick: i64,
+    /// Ticks in one unit of price.
+    per_unit: f64,
     bids: Ladder,
     asks: Ladder,
     /// Which side was changed last: where sides cross, the other one is out of date.
@@ -24,6 +26,7 @@ impl DepthBook {
     pub fn new(increments: Increments) -> Self {
         Self {
             tick: increments.tick().0,
+            per_unit: 1.0 / increments.tick().0 as f64,
             bids: Ladder::new(Side::Buy),
             asks: Ladder::new(Side::Sell),
             newest: Side::Buy,
@@ -94,10 +97,19 @@ impl DepthBook {
         self.side(side).iter().map(|(tick, size)| Level { price: self.price(tick).to_f64(), size })
     }
 
+    /// The tick nearest to a price. A division of integers takes longer than all else that a change does, so the quotient is
+    /// guessed in floating point, within a few of what it is, and put right.
     #[inline]
     fn tick_of(&self, price: Price) -> i64 {
-        let (whole, rest) = (price.0.div_euclid(self.tick), price.0.rem_euclid(self.tick));
-        whole + i64::from(2 * rest >= self.tick)
+        let mut whole = (price.0 as f64 * self.per_unit) as i64;
+        let mut rest = price.0.wrapping_sub(whole.wrapping_mul(self.tick));
+        while rest < 0 {
+            (whole, rest) = (whole - 1, rest + self.tick);
+        }
+        while rest >= self.tick {
+            (whole, rest) = (whole + 1, rest - self.tick);
+        }
+        whole + i64::from(rest >= self.tick - rest)
     }
 
     fn price(&self, tick: i64) -> Price {

@@ -102,6 +102,7 @@ impl Session<'_> {
             quantity: quantity.to_f64(),
             decided_at: now,
             arrives_at: now,
+            seen_until: now,
             assumed: mid,
             mid,
             participation_limit: f64::INFINITY,

@@ -16,6 +16,18 @@ pub struct Met {
     pub reference: f64,
     /// Volume it can take part in [units]; infinite where the data do not know it.
     pub volume: f64,
+    /// What is displayed where it joins a queue [units]: 0 where it does not, infinite where the data do not know it.
+    pub displayed: f64,
+    /// The mid that had been seen when it was decided, above what the mid was then [bps of it].
+    pub seen: f64,
+}
+
+impl Met {
+    /// What an order meets that joins no queue.
+    #[must_use]
+    pub fn at(book: Book, reference: f64, volume: f64) -> Self {
+        Self { book, reference, volume, displayed: 0.0, seen: 0.0 }
+    }
 }
 
 /// What mechanisms add to an execution; the default adds nothing.
@@ -25,6 +37,10 @@ pub struct ExecutionEffect {
     pub concession: f64,
     /// Orders are filled in whole multiples of it [units]; 0 where any quantity can be filled.
     pub lot: f64,
+    /// What stands ahead of an order that joins a queue beside what is displayed [units].
+    pub ahead: f64,
+    /// By how much own orders have moved the market up that an order which rests waits in [currency].
+    pub displaced: f64,
 }
 
 /// What is reported of an order, or of a position that is held.
@@ -50,6 +66,8 @@ pub struct Report {
     pub cost: f64,
     /// Part of the order that was filled, from 0 to 1.
     pub filled: f64,
+    /// The mid that had been seen when it was decided, above what the mid was then [bps of it].
+    pub seen: f64,
 }
 
 impl Default for Report {
@@ -66,6 +84,7 @@ impl Default for Report {
             fee: 0.0,
             cost: 0.0,
             filled: 0.0,
+            seen: 0.0,
         }
     }
 }
@@ -85,6 +104,7 @@ impl Report {
             fee: 0.0,
             cost: cost_bps(order.side, price, order.assumed, order.mid),
             filled: quantity / order.quantity,
+            seen: 0.0,
         }
     }
 
@@ -124,7 +144,8 @@ impl Observation for Report {
         match k {
             0 => self.cost,
             1 => fee_bps(self.fee, self.notional()).unwrap_or(0.0),
-            _ => self.filled,
+            2 => self.filled,
+            _ => self.seen,
         }
     }
 }
@@ -133,8 +154,9 @@ impl Observation for Report {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Execution;
 
-/// What is seen of an order: cost against the assumed price, fee, part filled.
-static CHANNELS: &[Channel] = &[Channel::new("cost", "bps"), Channel::new("fee", "bps"), Channel::new("filled", "")];
+/// What is seen of an order: cost against the assumed price, fee, part filled, and the mid it was decided on.
+static CHANNELS: &[Channel] =
+    &[Channel::new("cost", "bps"), Channel::new("fee", "bps"), Channel::new("filled", ""), Channel::new("seen", "bps")];
 
 impl Plant for Execution {
     type Command = InFlight;
@@ -176,6 +198,7 @@ impl Plant for Execution {
             effort: size(costs.iter().map(|cost| cost.abs()).collect()),
             output: if spread > 0.0 { spread } else { 1.0 },
             delay: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_delay()).collect()),
+            age: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_age()).collect()),
             ..Typical::default()
         }
     }
@@ -207,7 +230,7 @@ impl Execution {
 
     /// To what precision a log can tell a channel, in its unit: no fit of it can be better than that.
     ///
-    /// - `cost` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
+    /// - `cost` and `seen` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
     /// - `fee` [bps]: half a cent over the notional;
     /// - `filled` []: half a lot over the quantity.
     ///
@@ -216,7 +239,7 @@ impl Execution {
     pub fn resolution_of(recording: &Recording<OrderLog>, channel: &str) -> f64 {
         let instrument = recording.stimulus.instrument();
         let of = |order: &InFlight| match channel {
-            "cost" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
+            "cost" | "seen" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
             "fee" => Self::FEE_ROUNDING / (order.quantity * order.mid) * 1e4,
             "filled" => 0.5 * instrument.lot_size / order.quantity,
             _ => 0.0,
@@ -245,10 +268,13 @@ impl Dynamics<Execution> for Execution {
     fn advance(&self, _tick: Tick, reports: &mut [Report], met: &[Met], orders: &[InFlight], effects: &[ExecutionEffect]) {
         for (((report, met), order), effect) in reports.iter_mut().zip(met).zip(orders).zip(effects) {
             let price = met.reference + order.side.sign() * effect.concession;
-            // What is held is held, however much is traded.
-            let quantity =
-                if order.role == Role::Holder { order.quantity } else { whole_lots(order.fillable(met.volume), effect.lot) };
-            *report = Report::of(order, price, quantity);
+            let quantity = match order.role {
+                // What is held is held, however much is traded.
+                Role::Holder => order.quantity,
+                // Of what would have filled it, whoever stands ahead of an order that rests gets the first part.
+                Role::Taker | Role::Maker => whole_lots((order.fillable(met.volume) - effect.ahead).max(0.0), effect.lot),
+            };
+            *report = Report { seen: met.seen, ..Report::of(order, price, quantity) };
         }
     }
 

@@ -2,9 +2,10 @@
 
 use crate::sim2real::Timestamp;
 
-use super::line::{Line, RowKind};
+use super::line::Line;
+use super::sources::RowKind;
 use super::stream::StreamError;
-use super::{Event, History, Sources};
+use super::{Bar, Event, History, Sources};
 
 /// The rows of one kind of one instrument, and how far they have been read.
 #[derive(Debug, Clone, Copy)]
@@ -124,6 +125,32 @@ impl<'d> Feed<'d> {
         self.lines[instrument].read_on(kind, next, keep)
     }
 
+    /// The bars of an instrument that come next, where they are in memory, and when other data come between them.
+    pub(super) fn bars_alone(&self) -> Option<(usize, &'d [Bar], Timestamp)> {
+        let winner = *self.losers.first()?;
+        let Track { instrument, kind, next } = self.tracks[winner as usize];
+        if kind != RowKind::Bars {
+            return None;
+        }
+        let bars = self.lines[instrument].all_bars()?.get(next..)?;
+        // The winner has beaten all others: who comes second is among the losers on its way.
+        let (mut node, mut end) = ((self.tracks.len() + winner as usize) / 2, Timestamp::MAX);
+        while node > 0 {
+            end = end.min(self.times[self.losers[node] as usize]);
+            node /= 2;
+        }
+        Some((instrument, bars, end))
+    }
+
+    /// The first `count` of [these bars](Self::bars_alone) are over.
+    pub(super) fn skip_bars(&mut self, count: usize) {
+        let winner = self.losers[0];
+        let track = &mut self.tracks[winner as usize];
+        track.next += count;
+        self.times[winner as usize] = self.lines[track.instrument].time(track.kind, track.next);
+        self.replay(winner);
+    }
+
     fn build(&mut self) {
         let count = self.tracks.len();
         // Leaf k stands at node count + k; each match is played once both who play it are known.
@@ -172,7 +199,7 @@ impl Iterator for Feed<'_> {
         let Track { instrument, kind, next: row } = *track;
         let line = &self.lines[instrument];
         let end = line.batch(kind, row);
-        let known_at = line.known_at(kind, row).max(time);
+        let known_at = line.known_at(kind, row, time);
         let event = Event { time, instrument, kind: kind.event() };
         track.next = end;
         if line.is_low(kind, end) {

@@ -19,6 +19,7 @@ use crate::sim2real::Timestamp;
 
 use super::agenda::{Due, Phase};
 use super::calendar::{Calendar, Hours, Trading};
+use super::halt::{Halt, Halts};
 use super::session::Session;
 use super::{Arrival, Bar, EventKind, OrderId, TimeInForce};
 
@@ -97,26 +98,44 @@ impl<'d> TradingHours<'d> {
 pub(super) struct Timetable<'d> {
     /// Of each instrument; nothing at all where none has a calendar.
     each: Vec<Option<TradingHours<'d>>>,
+    /// Of each instrument; nothing at all where none is ever halted.
+    halts: Vec<Halts<'d>>,
     /// The end of the last bar that outlasted its session: what became of orders in it is known no earlier.
     pub known_from: Timestamp,
 }
 
 impl<'d> Timetable<'d> {
-    /// Of `count` instruments, with the calendars of the first of them.
-    pub fn new(calendars: impl Iterator<Item = Option<&'d Calendar>>, count: usize) -> Self {
+    /// Of `count` instruments, with the calendars of the first of them, and their halts.
+    pub fn new(calendars: impl Iterator<Item = Option<&'d Calendar>>, halts: &'d [Halt], count: usize) -> Self {
         let mut each: Vec<_> = calendars.map(|calendar| calendar.map(TradingHours::new)).collect();
         if each.iter().any(Option::is_some) {
             each.resize(count, None);
         } else {
             each.clear();
         }
-        Self { each, known_from: Timestamp::MIN }
+        Self { each, halts: Halts::of(halts, count), known_from: Timestamp::MIN }
     }
 
-    /// Whether no instrument has a calendar.
+    /// Whether all instruments trade whenever there are data.
     #[inline]
     pub fn is_empty(&self) -> bool {
-        self.each.is_empty()
+        self.each.is_empty() && self.halts.is_empty()
+    }
+
+    /// The halts of each instrument; nothing at all where there are none.
+    pub fn halts(&self) -> &[Halts<'d>] {
+        &self.halts
+    }
+
+    /// Those of one.
+    pub fn halts_mut(&mut self, instrument: usize) -> Option<&mut Halts<'d>> {
+        self.halts.get_mut(instrument)
+    }
+
+    /// Whether anything says when an instrument does not trade.
+    pub fn keeps(&self, instrument: usize) -> bool {
+        self.each.get(instrument).is_some_and(Option::is_some)
+            || self.halts.get(instrument).is_some_and(|halts| !halts.is_empty())
     }
 
     /// Of each instrument.
@@ -137,8 +156,9 @@ impl<'d> Timetable<'d> {
 }
 
 impl Session<'_> {
-    /// The doors of an instrument's floor are opened or closed, as its calendar has it at `now`.
+    /// The doors of an instrument's floor are opened or closed, as its calendar and its halts have it at `now`.
     pub(super) fn keep_hours(&mut self, instrument: usize, now: Timestamp) {
+        self.keep_halts(instrument, now);
         let Some(hours) = self.timetable.of(instrument) else { return };
         let floor = &mut self.venue.floors[instrument];
         match hours.trading.session_at(now) {
@@ -153,10 +173,11 @@ impl Session<'_> {
         }
     }
 
-    /// The same for data: those from outside sessions are counted.
+    /// The same for data: those from outside sessions and from halts are counted.
     pub(super) fn keep_hours_of(&mut self, arrival: &Arrival) {
         let super::Event { time, instrument, kind } = arrival.event;
-        let Some(hours) = self.timetable.of(instrument) else { return };
+        self.count_halted(arrival);
+        let Some(hours) = self.timetable.of(instrument) else { return self.keep_halts(instrument, time) };
         if kind == EventKind::Bar {
             let Some(bar) = self.feed.line(instrument).bar(arrival.row) else { return };
             match hours.within(bar) {
@@ -185,6 +206,7 @@ impl Session<'_> {
             }),
         };
         let Some((met, closes_for)) = met else { return };
+        let Some(met) = self.timetable.traded(instrument, met) else { return };
         if met.known_at < bar.known_at {
             self.timetable.known_from = self.timetable.known_from.max(bar.known_at);
         }
@@ -195,10 +217,11 @@ impl Session<'_> {
 
     /// When orders meet the open of `bar`, if they do.
     pub(super) fn opens_at(&mut self, instrument: usize, bar: &Bar) -> Option<Timestamp> {
-        match self.timetable.of(instrument) {
-            None => Some(bar.open_at),
-            Some(hours) => hours.within(bar).map(|met| met.bar.open_at),
-        }
+        let opens_at = match self.timetable.of(instrument) {
+            None => bar.open_at,
+            Some(hours) => hours.within(bar)?.bar.open_at,
+        };
+        (!self.timetable.is_halted(instrument, opens_at)).then_some(opens_at)
     }
 
     /// The bar at `row` as orders meet its open, and whether it is the first of a day.
@@ -244,6 +267,7 @@ impl Session<'_> {
         if self.venue.floors[instrument].by_bars() && self.outlasting(instrument, at).is_some() {
             return;
         }
+        self.keep_halts(instrument, at);
         let Some(hours) = self.timetable.of(instrument) else { return };
         let traded = hours.session.is_some_and(|session| session.close == at);
         self.venue.floors[instrument].close_at(at, traded);

@@ -1,7 +1,8 @@
 //! What is known of one instrument: all that a strategy may see, and nothing that is still to come.
 
-use super::line::{Line, RowKind};
+use super::line::Line;
 use super::past::{Past, PastQuotes};
+use super::sources::RowKind;
 use super::venue::Others;
 use super::{Arrival, Bar, DepthBook, OrderId, OrderKind, Price, Print, Quantity, Side};
 

@@ -211,6 +211,8 @@ impl Default for Latencies {
 #[derive(Debug, Clone)]
 pub(super) struct Clocks {
     latencies: Latencies,
+    /// By how much data come later besides, whatever the strain [s].
+    stale: f64,
     feed: Draws,
     order: Draws,
     response: Draws,
@@ -230,10 +232,12 @@ struct Watch {
 }
 
 impl Clocks {
-    pub fn new(latencies: Latencies, seed: Seed) -> Self {
+    /// Clocks of a run whose data come `stale` [s] later than by their latency.
+    pub fn new(latencies: Latencies, stale: f64, seed: Seed) -> Self {
         let stream = |name: &str| seed.stream(name);
         Self {
             latencies,
+            stale,
             feed: stream("latency.feed"),
             order: stream("latency.order"),
             response: stream("latency.response"),
@@ -276,7 +280,7 @@ impl Clocks {
     /// Data of `time` reach the strategy.
     pub fn shown(&mut self, time: Timestamp) -> Timestamp {
         let seconds = self.longer() * self.latencies.feed.draw(&mut self.feed);
-        later(time, seconds)
+        later(time, seconds + self.stale)
     }
 
     /// When an order that leaves at `time`, or is delayed to it, arrives.
@@ -333,7 +337,7 @@ mod tests {
     fn a_strained_market_is_slower() {
         let strain = Strain { per_thousand_events: 1.0, per_bp_a_second: 0.0 };
         let order = Latency::Constant { seconds: 0.001 };
-        let mut clocks = Clocks::new(Latencies { order, strain, ..Latencies::default() }, Seed(1));
+        let mut clocks = Clocks::new(Latencies { order, strain, ..Latencies::default() }, 0.0, Seed(1));
         let start = Timestamp(1_000_000_000_000);
         assert_eq!((clocks.order(start) - start), 1_000_000);
         // 5,000 events a second, each at its 0.2 ms.

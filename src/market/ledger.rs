@@ -123,6 +123,7 @@ impl Ledger {
     }
 
     /// Whether nothing is held.
+    #[inline]
     #[must_use]
     pub fn is_flat(&self) -> bool {
         self.open == 0
@@ -130,6 +131,7 @@ impl Ledger {
 
     /// Sum of what all positions are worth, short ones too counted as positive [base currency]. Those in a currency without
     /// a rate, with which equity is an error, are not in it.
+    #[inline]
     #[must_use]
     pub fn gross(&self) -> f64 {
         if self.open == 0 {
@@ -137,15 +139,16 @@ impl Ledger {
         }
         match (self.positions.as_slice(), self.balances.as_slice()) {
             ([_], [only]) => only.holdings.to_f64().abs(),
-            (many, [_]) => many.iter().map(|p| p.value().to_f64().abs()).sum(),
-            (many, balances) => {
-                let rate = |p: &Position| match p.currency {
-                    0 => 1.0,
-                    other => balances[other].rate.map_or(0.0, Price::to_f64),
-                };
-                many.iter().map(|p| p.value().to_f64().abs() * rate(p)).sum()
-            }
+            _ => self.gross_of_many(),
         }
+    }
+
+    fn gross_of_many(&self) -> f64 {
+        let rate = |p: &Position| match p.currency {
+            0 => 1.0,
+            other => self.balances[other].rate.map_or(0.0, Price::to_f64),
+        };
+        self.positions.iter().map(|p| p.value().to_f64().abs() * rate(p)).sum()
     }
 
     /// Values `instrument` at `price` from now on.

@@ -1,85 +1,12 @@
 //! The data of one instrument as a feed reads them: whole, or from streams with some rows around the present at hand.
 
-use std::fmt;
 use std::ops::Range;
 
 use crate::sim2real::Timestamp;
 
-use super::stream::{Known, Stream, StreamError};
-use super::{Bar, Book, DataNotes, DepthChange, EventKind, History, OrderEvent, Print, Quote, Quotes};
-
-/// The kinds of rows a market tells, in the order in which they come at one instant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum RowKind {
-    Bars,
-    Trades,
-    Depth,
-    Orders,
-    Quotes,
-}
-
-impl RowKind {
-    const COUNT: usize = 5;
-    pub const ALL: [Self; Self::COUNT] = [Self::Bars, Self::Trades, Self::Depth, Self::Orders, Self::Quotes];
-
-    /// What a row of it is to a strategy.
-    pub fn event(self) -> EventKind {
-        match self {
-            Self::Bars => EventKind::Bar,
-            Self::Trades => EventKind::Trade,
-            Self::Depth | Self::Orders => EventKind::Depth,
-            Self::Quotes => EventKind::Quote,
-        }
-    }
-}
-
-/// Streams of the data of one instrument: what a backtest runs on that does not hold them in memory.
-#[derive(Default)]
-pub struct Sources {
-    /// Bars.
-    pub bars: Option<Box<dyn Stream<Bar>>>,
-    /// Quotes.
-    pub quotes: Option<Box<dyn Stream<Known<Book>>>>,
-    /// Trades.
-    pub trades: Option<Box<dyn Stream<Known<Print>>>>,
-    /// Changes of the book, price by price.
-    pub depth: Option<Box<dyn Stream<DepthChange>>>,
-    /// Events of resting orders.
-    pub order_events: Option<Box<dyn Stream<OrderEvent>>>,
-}
-
-impl fmt::Debug for Sources {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { bars, quotes, trades, depth, order_events } = self;
-        let there =
-            [bars.is_some(), quotes.is_some(), trades.is_some(), depth.is_some(), order_events.is_some()].map(usize::from);
-        write!(f, "Sources({} streams)", there.iter().sum::<usize>())
-    }
-}
-
-impl Sources {
-    fn has(&self, kind: RowKind) -> bool {
-        match kind {
-            RowKind::Bars => self.bars.is_some(),
-            RowKind::Trades => self.trades.is_some(),
-            RowKind::Depth => self.depth.is_some(),
-            RowKind::Orders => self.order_events.is_some(),
-            RowKind::Quotes => self.quotes.is_some(),
-        }
-    }
-
-    fn notes(&self) -> Vec<DataNotes> {
-        let Self { bars, quotes, trades, depth, order_events } = self;
-        let all = [
-            bars.as_ref().and_then(|s| s.notes()),
-            quotes.as_ref().and_then(|s| s.notes()),
-            trades.as_ref().and_then(|s| s.notes()),
-            depth.as_ref().and_then(|s| s.notes()),
-            order_events.as_ref().and_then(|s| s.notes()),
-        ];
-        all.into_iter().flatten().cloned().collect()
-    }
-}
+use super::sources::RowKind;
+use super::stream::{Known, StreamError};
+use super::{Bar, Book, DataNotes, DepthChange, History, OrderEvent, Print, Quote, Quotes, Sources};
 
 /// The data of one instrument. Rows are known by their numbers from the first of all, be it at hand or not.
 #[derive(Debug)]
@@ -162,6 +89,14 @@ impl<'d> Line<'d> {
         }
     }
 
+    /// All bars, where they are in memory.
+    pub fn all_bars(&self) -> Option<&'d [Bar]> {
+        match self.data {
+            Data::Whole(_, rows) => Some(rows.bars),
+            Data::Part(_) => None,
+        }
+    }
+
     /// The rows at hand.
     #[cfg(feature = "io")]
     pub fn into_at_hand(self) -> History {
@@ -192,11 +127,54 @@ impl<'d> Line<'d> {
         }
     }
 
+    // One table at a time: all of them together are more than registers hold.
+
     #[inline(always)]
-    fn at_hand(&self) -> Rows<'_> {
+    fn bars(&self) -> &[Bar] {
         match &self.data {
-            Data::Whole(_, rows) => *rows,
-            Data::Part(part) => Rows::of(&part.at_hand),
+            Data::Whole(_, rows) => rows.bars,
+            Data::Part(part) => part.at_hand.bars(),
+        }
+    }
+
+    #[inline(always)]
+    fn all_quotes(&self) -> &Quotes {
+        match &self.data {
+            Data::Whole(_, rows) => rows.quotes,
+            Data::Part(part) => part.at_hand.quotes(),
+        }
+    }
+
+    #[inline(always)]
+    fn prints(&self) -> &[Print] {
+        match &self.data {
+            Data::Whole(_, rows) => rows.prints,
+            Data::Part(part) => part.at_hand.prints(),
+        }
+    }
+
+    #[inline(always)]
+    fn changes(&self) -> &[DepthChange] {
+        match &self.data {
+            Data::Whole(_, rows) => rows.depth,
+            Data::Part(part) => part.at_hand.depth(),
+        }
+    }
+
+    #[inline(always)]
+    fn events(&self) -> &[OrderEvent] {
+        match &self.data {
+            Data::Whole(_, rows) => rows.order_events,
+            Data::Part(part) => part.at_hand.order_events(),
+        }
+    }
+
+    /// When each trade could be known, where that is not when it happened.
+    #[inline(always)]
+    fn prints_known(&self) -> &[Timestamp] {
+        match &self.data {
+            Data::Whole(_, rows) => rows.prints_known,
+            Data::Part(part) => part.at_hand.prints_known(),
         }
     }
 
@@ -209,13 +187,13 @@ impl<'d> Line<'d> {
     /// Bar `row`.
     #[inline(always)]
     pub fn bar(&self, row: usize) -> Option<&Bar> {
-        self.at_hand().bars.get(self.place(RowKind::Bars, row))
+        self.bars().get(self.place(RowKind::Bars, row))
     }
 
     /// The quotes at hand, and the place of quote `row` among them.
     #[inline(always)]
     pub fn quotes(&self, row: usize) -> (&Quotes, usize) {
-        (self.at_hand().quotes, self.place(RowKind::Quotes, row))
+        (self.all_quotes(), self.place(RowKind::Quotes, row))
     }
 
     /// Quote `row`.
@@ -228,58 +206,58 @@ impl<'d> Line<'d> {
     /// Trade `row`.
     #[inline(always)]
     pub fn print(&self, row: usize) -> Option<&Print> {
-        self.at_hand().prints.get(self.place(RowKind::Trades, row))
+        self.prints().get(self.place(RowKind::Trades, row))
     }
 
     /// Changes of the book.
     #[inline(always)]
     pub fn depth(&self, rows: Range<usize>) -> &[DepthChange] {
         let kind = RowKind::Depth;
-        self.at_hand().depth.get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
+        self.changes().get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
     }
 
     /// Events of resting orders.
     #[inline(always)]
     pub fn order_events(&self, rows: Range<usize>) -> &[OrderEvent] {
         let kind = RowKind::Orders;
-        self.at_hand().order_events.get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
+        self.events().get(self.place(kind, rows.start)..self.place(kind, rows.end)).unwrap_or_default()
     }
 
     /// When a row happens, at the exchange: a bar when it is over. [`Timestamp::MAX`] beyond the last.
     #[inline(always)]
     pub fn time(&self, kind: RowKind, row: usize) -> Timestamp {
-        let (data, at) = (self.at_hand(), self.place(kind, row));
+        let at = self.place(kind, row);
         let time = match kind {
-            RowKind::Bars => data.bars.get(at).map(|bar| bar.known_at),
-            RowKind::Quotes => data.quotes.times().get(at).copied(),
-            RowKind::Trades => data.prints.get(at).map(|print| print.time),
-            RowKind::Depth => data.depth.get(at).map(|change| change.time),
-            RowKind::Orders => data.order_events.get(at).map(|event| event.time),
+            RowKind::Bars => self.bars().get(at).map(|bar| bar.known_at),
+            RowKind::Quotes => self.all_quotes().times().get(at).copied(),
+            RowKind::Trades => self.prints().get(at).map(|print| print.time),
+            RowKind::Depth => self.changes().get(at).map(|change| change.time),
+            RowKind::Orders => self.events().get(at).map(|event| event.time),
         };
         time.unwrap_or(Timestamp::MAX)
     }
 
-    /// When a row can be known.
+    /// When a row that happens at `time` can be known: that is never earlier.
     #[inline(always)]
-    pub fn known_at(&self, kind: RowKind, row: usize) -> Timestamp {
-        let (data, at) = (self.at_hand(), self.place(kind, row));
+    pub fn known_at(&self, kind: RowKind, row: usize, time: Timestamp) -> Timestamp {
+        let at = self.place(kind, row);
         let known_at = match kind {
-            RowKind::Trades => data.prints_known.get(at).copied().or(data.prints.get(at).map(|print| print.time)),
-            RowKind::Depth => data.depth.get(at).map(|change| change.known_at),
-            RowKind::Orders => data.order_events.get(at).map(|event| event.known_at),
-            RowKind::Bars | RowKind::Quotes => return self.time(kind, row),
+            RowKind::Trades => self.prints_known().get(at).copied(),
+            RowKind::Depth => self.changes().get(at).map(|change| change.known_at),
+            RowKind::Orders => self.events().get(at).map(|event| event.known_at),
+            RowKind::Bars | RowKind::Quotes => None,
         };
-        known_at.unwrap_or(Timestamp::MAX)
+        known_at.map_or(time, |known_at| known_at.max(time))
     }
 
     /// One row behind the last of those that belong to the same instant as `row`: a book is told in many changes, and is
     /// whole when all of one instant are in.
     #[inline(always)]
     pub fn batch(&self, kind: RowKind, row: usize) -> usize {
-        let (data, at) = (self.at_hand(), self.place(kind, row));
+        let at = self.place(kind, row);
         match kind {
-            RowKind::Depth => row + same(data.depth, at, |change| change.time),
-            RowKind::Orders => row + same(data.order_events, at, |event| event.time),
+            RowKind::Depth => row + same(self.changes(), at, |change| change.time),
+            RowKind::Orders => row + same(self.events(), at, |event| event.time),
             RowKind::Bars | RowKind::Quotes | RowKind::Trades => row + 1,
         }
     }

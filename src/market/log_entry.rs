@@ -29,6 +29,8 @@ pub struct LoggedOrder {
     pub decided_at: Timestamp,
     /// What kind of order it was.
     pub kind: OrderType,
+    /// Mid of the quote it was decided on [currency], where the log says which that was.
+    pub seen_mid: Option<f64>,
 }
 
 /// A row of `fills`.
@@ -193,6 +195,7 @@ mod tests {
             quantity: 10.0,
             decided_at: Timestamp(1_000_000_000),
             kind: OrderType::Market,
+            seen_mid: None,
         }
     }
 

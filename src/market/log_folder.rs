@@ -68,6 +68,7 @@ fn read_orders(table: &Table, time: &TimeFormat) -> Result<Vec<LoggedOrder>, Inp
     let (ids, times) = (table.texts_complete("order_id")?, table.times("decided_at", time)?);
     let (sides, quantities) = (table.texts_complete("side")?, above_zero(table, "qty")?);
     let kinds = table.texts_complete("type")?;
+    let seen = seen_mids(table)?;
     let order = |(row, id): (usize, String)| {
         let side = Side::of_word(&sides[row]).ok_or_else(|| {
             table
@@ -79,9 +80,21 @@ fn read_orders(table: &Table, time: &TimeFormat) -> Result<Vec<LoggedOrder>, Inp
             "market" | "mkt" => OrderType::Market,
             other => OrderType::Other(other.to_owned()),
         };
-        Ok(LoggedOrder { id, side, quantity: quantities[row], decided_at: times[row], kind })
+        Ok(LoggedOrder { id, side, quantity: quantities[row], decided_at: times[row], kind, seen_mid: seen[row] })
     };
     ids.into_iter().enumerate().map(order).collect()
+}
+
+/// The mids that orders were decided on, where `seen_bid` and `seen_ask` are there and hold a quote.
+fn seen_mids(table: &Table) -> Result<Vec<Option<f64>>, InputError> {
+    if !(table.has("seen_bid") && table.has("seen_ask")) {
+        return Ok(vec![None; table.rows()]);
+    }
+    let (bids, asks) = (table.floats("seen_bid")?, table.floats("seen_ask")?);
+    let mid = |(bid, ask): (&Option<f64>, &Option<f64>)| {
+        bid.zip(*ask).filter(|(bid, ask)| *bid > 0.0 && bid <= ask && ask.is_finite()).map(|(bid, ask)| 0.5 * (bid + ask))
+    };
+    Ok(bids.iter().zip(&asks).map(mid).collect())
 }
 
 fn read_fills(table: &Table, time: &TimeFormat) -> Result<Vec<LoggedFill>, InputError> {

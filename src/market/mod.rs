@@ -27,6 +27,7 @@ mod desk;
 mod equity_curve;
 mod execution;
 mod feed;
+mod halt;
 mod history;
 #[cfg(feature = "io")]
 mod history_file;
@@ -54,6 +55,7 @@ mod price_assumption;
 mod quote;
 mod rates;
 mod reason;
+pub mod reconcile;
 mod row_check;
 #[cfg(feature = "io")]
 mod run;
@@ -64,6 +66,8 @@ mod run_calendar;
 #[cfg(feature = "io")]
 mod run_figures;
 #[cfg(feature = "io")]
+mod run_halts;
+#[cfg(feature = "io")]
 mod run_log;
 #[cfg(feature = "io")]
 mod run_needs;
@@ -72,6 +76,8 @@ mod run_page;
 #[cfg(feature = "io")]
 mod run_stream;
 mod session;
+mod shown_age;
+mod sources;
 mod strategy;
 mod stream;
 #[cfg(feature = "io")]
@@ -109,6 +115,7 @@ pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
 pub use depth_book::DepthBook;
 pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
 pub use feed::{Arrival, Feed};
+pub use halt::{Halt, HaltSeen, HaltSummary, UnderHalt, WhileHalted};
 pub use history::{History, HistoryError};
 pub use instrument::Instrument;
 pub use known::OpenOrder;
@@ -117,7 +124,6 @@ pub use ledger::{
     Balance, ChargeKind, Charges, Closing, Conversion, Dividend, Fraction, Income, Ledger, LedgerError, Margin, Multiplier,
     Position, Requirement, Split, Terms, Trade,
 };
-pub use line::Sources;
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
 #[cfg(feature = "io")]
 pub use log_folder::{LogSettings, read_log};
@@ -136,6 +142,7 @@ pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
 #[cfg(feature = "io")]
 pub use run_stream::prepare_streaming_run;
 pub use session::Session;
+pub use sources::Sources;
 pub use strategy::{Event, EventKind, News, Notice, Orders, Strategy, View};
 #[cfg(feature = "io")]
 pub use stream::FileStream;

@@ -204,6 +204,14 @@ impl Cash {
         (if self.0 < 0 { -size } else { size }) * 1e-18
     }
 
+    /// The floating-point number that is nearest of all [currency]: whoever writes it with the fewest digits that tell it apart
+    /// from others writes the amount again, where that has no more than 15 digits.
+    #[must_use]
+    pub fn nearest_f64(self) -> f64 {
+        // Reading a decimal number is what rounds right, however long it is.
+        self.to_string().parse().unwrap_or_else(|_| self.to_f64())
+    }
+
     /// The sum.
     ///
     /// # Errors
@@ -297,6 +305,13 @@ impl Increments {
         price.0 % self.tick == 0
     }
 
+    /// The whole number of ticks nearest to `distance` [currency]; none of them where it is not a price could be.
+    #[must_use]
+    pub fn whole_ticks(self, distance: f64) -> Price {
+        let ticks = (distance * NANO / self.tick as f64).round();
+        Price::nearest(ticks * self.tick as f64 / NANO).map_or(Price(0), |near| Price(near.0 - near.0 % self.tick))
+    }
+
     /// One tick.
     #[must_use]
     pub fn tick(self) -> Price {
@@ -316,6 +331,14 @@ mod tests {
 
     pub(super) fn instrument(tick_size: f64, lot_size: f64) -> Instrument {
         Instrument { symbol: "XYZ".into(), tick_size, lot_size, average_daily_volume: None, daily_volatility: None }
+    }
+
+    #[test]
+    fn an_amount_is_written_as_the_decimal_number_it_is() {
+        for nanos in [1_i128, 12_345_000_000, 99_999_999_999_999, -370_801_800_000] {
+            let cash = Cash(nanos * 1_000_000_000);
+            assert_eq!(cash.nearest_f64().to_string(), cash.to_string());
+        }
     }
 
     #[test]

@@ -2,10 +2,13 @@
 
 use crate::sim2real::{Command, DelayLine, Tick, Timestamp};
 
+use serde::Serialize;
+
 use super::{Multiplier, Price};
 
 /// Which way an order trades.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Side {
     /// Takes from the asks.
     Buy,
@@ -94,6 +97,8 @@ pub struct InFlight {
     pub decided_at: Timestamp,
     /// When it meets the market.
     pub arrives_at: Timestamp,
+    /// Until when whoever decided it had seen the market.
+    pub seen_until: Timestamp,
     /// The price the twin assumes it fills at [currency].
     pub assumed: f64,
     /// The mid, or the nearest to it the data know, when it was decided [currency]: the unit of its costs in bps.
@@ -119,6 +124,7 @@ impl InFlight {
             quantity,
             decided_at,
             arrives_at: decided_at,
+            seen_until: decided_at,
             assumed,
             mid,
             participation_limit: f64::INFINITY,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::sim2real::{Measured, Recording, Stimulus, Timestamp};
 
 use super::log_entry::fills_of_orders;
+use super::shown_age::{ShownAge, shown_age};
 use super::{
     Book, Execution, InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, Met, OrderType, Piece,
     PriceAssumption, Role, Seen, Tape, cost_bps, fee_bps, own_print, shown_delay,
@@ -28,6 +29,7 @@ pub struct OrderLog {
     orders: Vec<InFlight>,
     own_prints: Vec<Option<Timestamp>>,
     shown_delay: Option<f64>,
+    shown_age: Option<f64>,
     notes: Vec<String>,
 }
 
@@ -38,7 +40,8 @@ impl OrderLog {
     /// The recording of a log: a row a market order, in order of decision, with the channels of [`Execution`].
     ///
     /// `cost` is lost (`None`) where nothing was filled, and where the order was larger than all that was displayed: how
-    /// it went on behind the last level is not in the data. `fee` is lost where nothing was filled.
+    /// it went on behind the last level is not in the data. `fee` is lost where nothing was filled. `seen` is there where orders
+    /// say what they saw, and that is what the tape showed at one age before their decisions.
     ///
     /// # Errors
     /// Rows no log can hold ([`LogError`]); a tape that lacks what the assumed price is made of; orders outside the
@@ -68,10 +71,13 @@ impl OrderLog {
             .map(|(o, e)| own_print(market.tape.prints(), o.side, o.decided_at, e.first_fill?, &e.pieces))
             .collect();
         let delays = in_flight.iter().zip(&own_prints).filter_map(|(o, p)| Some(p.as_ref()?.seconds_since(o.decided_at)));
-        let mut log = Self { market, shown_delay: shown_delay(delays.collect()), own_prints, orders: in_flight, notes };
+        let shown_delay = shown_delay(delays.collect());
+        let mut log = Self { market, shown_delay, shown_age: None, own_prints, orders: in_flight, notes };
         let first = log.orders[0].decided_at;
         let time = log.orders.iter().map(|order| order.decided_at.seconds_since(first)).collect();
-        let measured = log.measure(&executions);
+        let mut measured = log.measure(&executions);
+        let seen: Vec<Option<f64>> = rows.iter().map(|(row, _)| orders[*row].seen_mid).collect();
+        measured.extend(log.look_at_seen(&seen));
         Ok(Recording { name: name.to_owned(), time, stimulus: log, measured })
     }
 
@@ -89,7 +95,7 @@ impl OrderLog {
         };
         let measured = [("cost", "bps"), ("fee", "bps"), ("filled", "")].map(lost).into();
         let own_prints = vec![None; orders.len()];
-        let log = Self { market, orders, own_prints, shown_delay: None, notes: Vec::new() };
+        let log = Self { market, orders, own_prints, shown_delay: None, shown_age: None, notes: Vec::new() };
         Recording { name: name.to_owned(), time, stimulus: log, measured }
     }
 
@@ -117,6 +123,28 @@ impl OrderLog {
         [("cost", "bps", cost), ("fee", "bps", fee), ("filled", "", filled)]
             .map(|(channel, unit, samples)| Measured { channel: channel.into(), unit: unit.into(), samples })
             .into()
+    }
+
+    /// The mids that were `seen` against those of the tape when orders were decided, where one age explains them: else they are
+    /// of other things, which no law of the plant could say. Where they are what the tape shows, there is nothing to explain.
+    fn look_at_seen(&mut self, seen: &[Option<f64>]) -> Option<Measured> {
+        let known = self.orders.iter().zip(seen).filter_map(|(order, mid)| Some((order.decided_at, (*mid)?)));
+        match shown_age(self.market.tape.quotes(), &known.collect::<Vec<_>>()) {
+            ShownAge::Timely => None,
+            ShownAge::Unclear { explained, known } => {
+                self.notes.push(format!(
+                    "what {known} orders saw (`seen_bid`, `seen_ask`) is not what the tape showed at any one age: at the best of \
+                     {explained}; nothing is made of it"
+                ));
+                None
+            }
+            ShownAge::Aged(seconds) => {
+                self.shown_age = Some(seconds);
+                let samples =
+                    self.orders.iter().zip(seen).map(|(order, mid)| mid.map(|mid| above(mid, order.mid))).collect();
+                Some(Measured { channel: "seen".into(), unit: "bps".into(), samples })
+            }
+        }
     }
 
     /// Whether order `row` is larger than all that was displayed when it arrived, as far as the stamps tell when that was.
@@ -169,6 +197,12 @@ impl OrderLog {
         self.shown_delay
     }
 
+    /// The age of what orders were decided on [s], where the log shows one.
+    #[must_use]
+    pub fn shown_age(&self) -> Option<f64> {
+        self.shown_age
+    }
+
     /// Whether any of the orders meets the market as a `role`.
     #[must_use]
     pub fn has_a(&self, role: Role) -> bool {
@@ -202,8 +236,28 @@ impl Stimulus<Execution> for OrderLog {
         let price = self.market.price.price_beside(book.as_ref(), tape, arriving.side, seen);
         let reference = price.unwrap_or(arriving.assumed);
         let volume = tape.volume_beside(book.as_ref(), arriving.side, seen);
-        Met { book: book.unwrap_or_else(|| Book::at_price(seen.end(), reference)), reference, volume }
+        let book = book.unwrap_or_else(|| Book::at_price(seen.end(), reference));
+        // What rests joins the best price of its own side.
+        let joined = book.opposite(arriving.side.opposite()).first().filter(|_| arriving.role == Role::Maker);
+        let displayed = joined.map_or(0.0, |level| level.size);
+        Met { displayed, seen: self.moved_since_seen(arriving), ..Met::at(book, reference, volume) }
     }
+}
+
+impl OrderLog {
+    /// The mid that had been seen when `order` was decided, above what the mid was then [bps].
+    fn moved_since_seen(&self, order: &InFlight) -> f64 {
+        // A log that does not say what was seen is not asked: looking up costs time.
+        if self.shown_age.is_none() || order.seen_until == order.decided_at {
+            return 0.0;
+        }
+        self.tape().mid(Seen::at(order.seen_until)).map_or(0.0, |mid| above(mid, order.mid))
+    }
+}
+
+/// How far `price` is above `mid` [bps of it].
+fn above(price: f64, mid: f64) -> f64 {
+    (price - mid) / mid * 1e4
 }
 
 /// What became of one order.

@@ -27,6 +27,8 @@ pub enum Reason {
     NoAuction,
     /// It could not wait, and came while the market was closed.
     MarketClosed,
+    /// It came while trading was halted, and could not wait or was not to.
+    Halted,
     /// Its time was over before it was sent.
     Late,
     /// It is linked with orders of another instrument, or with none.
@@ -69,6 +71,7 @@ impl Reason {
             Self::Margin => "margin",
             Self::NoAuction => "no_auction",
             Self::MarketClosed => "market_closed",
+            Self::Halted => "halted",
             Self::Late => "late",
             Self::Unlinked => "unlinked",
             Self::UnknownOrder => "unknown_order",
@@ -98,6 +101,7 @@ impl fmt::Display for Reason {
             Self::Margin => "it requires more initial margin than there is",
             Self::NoAuction => "it is for the open or the close, which its data do not tell",
             Self::MarketClosed => "it could not wait, and came while the market was closed",
+            Self::Halted => "it came while trading was halted",
             Self::Late => "its time was over before it was sent",
             Self::Unlinked => "it is linked with no order of its instrument",
             Self::UnknownOrder => "no order of that number works",

@@ -91,6 +91,7 @@ pub(super) fn settings(run: &RunFile, histories: &[History], beside: &Beside) ->
         latencies: run.latency::<Latencies>()?,
         equity_every: run.run.equity_every.or(run.run.stream.then_some(60 * Timestamp::NANOS)),
         calendars: beside.calendars.clone().of(run)?,
+        halts: beside.halts.all.clone(),
         account: account(run, beside.account.clone())?,
     })
 }
@@ -247,6 +248,7 @@ pub fn explained(run: &RunFile, error: &BacktestError) -> InputError {
         BacktestError::Latency(_) => &["latency"],
         BacktestError::NoRate { .. } => &["rate"],
         BacktestError::Queue(_) => &["matching", "queue"],
+        BacktestError::Halt { .. } => &["halt"],
         BacktestError::EquityEvery(_) => &["run", "equity_every"],
         _ => &["run"],
     };

@@ -1,9 +1,10 @@
-//! What a run reads beside market data: calendars, rates of currencies, dividends and splits.
+//! What a run reads beside market data: calendars, halts, rates of currencies, dividends and splits.
 
 use crate::io::{FeedKind, InputError, RateSource, RunFile, file_hash};
 
 use super::account_file::AccountFiles;
 use super::run_calendar::ReadCalendars;
+use super::run_halts::ReadHalts;
 use super::run_log::InputFile;
 
 /// What was read, once for all variants of a run.
@@ -11,6 +12,7 @@ use super::run_log::InputFile;
 pub(super) struct Beside {
     pub calendars: ReadCalendars,
     pub account: AccountFiles,
+    pub halts: ReadHalts,
     /// Rows of each `[[data]]` that is no market data.
     rows: Vec<Option<usize>>,
 }
@@ -23,16 +25,17 @@ impl Beside {
     pub fn read(run: &RunFile) -> Result<Self, InputError> {
         let mut calendars = ReadCalendars::default();
         calendars.of(run)?;
+        let halts = ReadHalts::read(run)?;
         let mut account = AccountFiles::read_rates(run)?;
         let rows = run.data.iter().map(|entry| match entry.kind {
             FeedKind::Actions => account.read_actions(run, entry).map(Some),
             _ => Ok(None),
         });
         let rows = rows.collect::<Result<_, _>>()?;
-        Ok(Self { calendars, account, rows })
+        Ok(Self { calendars, account, halts, rows })
     }
 
-    /// All files `run` depends on but its document: calendars, data, rates. `rows` are those of market data, where they were read.
+    /// All files `run` depends on but its document: calendars, data, rates, halts. `rows` are those of market data, where they were read.
     ///
     /// # Errors
     /// A file that cannot be read any more.
@@ -49,6 +52,7 @@ impl Beside {
                 inputs.push(InputFile { path: named.clone(), sha256: file_hash(path)?, rows });
             }
         }
+        inputs.extend(self.halts.files.iter().cloned());
         Ok(inputs)
     }
 }

@@ -10,7 +10,7 @@ use crate::report::{BacktestPage, ReportError};
 
 use super::metric::{Counts, CurrencySummary, InstrumentSummary, Metrics, RoundTrip};
 use super::run_page::run_page;
-use super::{Backtest, DataSummary, Instrument, MoneyError, Price, Record, Reference};
+use super::{Backtest, DataSummary, HaltSummary, Instrument, MoneyError, Price, Record, Reference};
 
 /// A file a run depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -68,6 +68,9 @@ pub struct RunSummary {
     pub account: Vec<CurrencySummary>,
     /// Instrument by instrument.
     pub instruments: Vec<InstrumentSummary>,
+    /// Its halts, and what came in them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub halts: Vec<HaltSummary>,
     /// What was found in the data, file by file.
     pub data: Vec<DataSummary>,
 }
@@ -89,6 +92,7 @@ impl RunSummary {
             counts: Counts::of(record),
             account,
             instruments: InstrumentSummary::of(record, instruments)?,
+            halts: HaltSummary::of(record, instruments),
             data: DataSummary::of(record, instruments),
         })
     }
@@ -240,7 +244,7 @@ impl Record {
             .times("filled_at", fills.iter().map(|f| f.filled_at))
             .floats("qty", fills.iter().map(|f| f.quantity.to_f64()))
             .floats("price", fills.iter().map(|f| f.price.to_f64()))
-            .floats("fee", fills.iter().map(|f| f.fee.to_f64()))
+            .floats("fee", fills.iter().map(|f| f.fee.nearest_f64()))
             .texts("liquidity", fills.iter().map(|f| f.why.role.word().to_owned()))
             .integers("fill_id", fills.iter().map(|f| f.fill_id as i64))
             .texts("data", fills.iter().map(|f| f.why.data.word().to_owned()))

@@ -10,7 +10,7 @@ use crate::sim2real::{Parameter, Simulator, Timestamp};
 
 use super::metric::{Drawdown, FillBands, Metrics, Month, RoundTrip};
 use super::run_figures::{figure_groups, key_figures};
-use super::{Backtest, Calendar, DataSeen, EquityPoint, Rate, Record, Reference, Requirement, RunSummary};
+use super::{Backtest, Calendar, DataSeen, EquityPoint, HaltSummary, Rate, Record, Reference, Requirement, RunSummary};
 
 /// Fills a page is given: it lists no more.
 const FILLS: usize = 200;
@@ -179,6 +179,11 @@ fn matched(summary: &RunSummary, backtest: &Backtest, data: &[DataSeen]) -> Vec<
         if !latency.is_none() {
             all.push((name, latency.to_string()));
         }
+    }
+    if !summary.halts.is_empty() {
+        let sum = |of: fn(&HaltSummary) -> usize| summary.halts.iter().map(of).sum::<usize>();
+        let (orders, refused) = (sum(|halt| halt.orders), sum(|halt| halt.refused));
+        all.push(("halts", format!("{}; orders that came in them: {orders}, refused: {refused}", summary.halts.len())));
     }
     all
 }

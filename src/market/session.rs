@@ -14,13 +14,16 @@ use super::equity_curve::EquityCurve;
 use super::hours::Timetable;
 use super::known::Known;
 use super::latency::Clocks;
-use super::line::{Line, RowKind};
+use super::line::Line;
 use super::mail::Mail;
+use super::mechanism::StaleQuotes;
+use super::sources::RowKind;
 use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, Orders, Reference, Strategy};
 
 mod exchange;
+mod quiet;
 mod telling;
 
 /// A backtest under way.
@@ -32,6 +35,8 @@ pub struct Session<'d> {
     trades_mark: Vec<bool>,
     /// Data take no time to the strategy but what their own two times say.
     direct: bool,
+    /// Nothing but bars and orders wants to be looked for.
+    can_be_quiet: bool,
     pub(super) agenda: Agenda,
     pub(super) clocks: Clocks,
     pub(super) timetable: Timetable<'d>,
@@ -81,6 +86,7 @@ fn detail(line: &Line<'_>) -> Detail {
 impl<'d> Session<'d> {
     pub(super) fn new(setup: &'d Backtest, feed: Feed<'d>) -> Self {
         let Settings { seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
+        let stale = StaleQuotes::delay_before(&setup.venue);
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
         let origin = feed.peek().unwrap_or_default();
         let (intrabar, limit_fill, queue) = (matching.intrabar, matching.limit_fill, matching.queue);
@@ -103,27 +109,31 @@ impl<'d> Session<'d> {
             symbols: setup.instruments.iter().map(|i| i.symbol.as_str()).collect(),
             increments: &setup.increments,
             depth,
-            rules: Rules { reference, intrabar, limit_fill, queue, origin },
+            rules: Rules { reference, intrabar, limit_fill, queue, halted: matching.halted, origin },
             seed,
         };
         let mut venue = Venue::new(&setup.venue, &venue);
         let conceding = venue.conceding.len();
         let count = setup.instruments.len();
-        let timetable = Timetable::new(setup.settings.calendars.iter().map(Option::as_deref), count);
-        for (k, _) in timetable.each().iter().enumerate().filter(|(_, hours)| hours.is_some()) {
-            venue.floors[k].auctions = Some(Auctions::of(feed.line(k)));
+        let calendars = setup.settings.calendars.iter().map(Option::as_deref);
+        let timetable = Timetable::new(calendars, &setup.settings.halts, count);
+        for k in (0..count).filter(|k| timetable.keeps(*k)) {
+            let has_hours = timetable.each().get(k).is_some_and(Option::is_some);
+            let of = if has_hours { Auctions::of } else { Auctions::always };
+            venue.floors[k].auctions = Some(of(feed.line(k)));
         }
         let mut agenda = Agenda::default();
         let (ledger, keeping) = Keeping::start(&setup.settings, count, origin, &mut agenda);
-        Self {
+        let mut session = Self {
             setup,
             equity: EquityCurve::new(equity_every, feed.rows()),
             feed,
             trades_mark,
             transit: Transit::new(count),
             agenda,
-            direct: latencies.feed.is_none(),
-            clocks: Clocks::new(latencies, seed),
+            direct: latencies.feed.is_none() && stale == 0.0,
+            can_be_quiet: false,
+            clocks: Clocks::new(latencies, stale, seed),
             timetable,
             known,
             daily: vec![Daily::default(); count],
@@ -141,7 +151,9 @@ impl<'d> Session<'d> {
             orders: Orders::default(),
             held: Held::default(),
             rows: 0,
-        }
+        };
+        session.can_be_quiet = session.may_be_quiet();
+        session
     }
 
     /// Rows of data read, and rows in all, where all are in memory.
@@ -171,6 +183,7 @@ impl<'d> Session<'d> {
             transit: self.transit.clone(),
             trades_mark: self.trades_mark.clone(),
             direct: self.direct,
+            can_be_quiet: self.can_be_quiet,
             agenda: self.agenda.clone(),
             clocks: self.clocks.clone(),
             timetable: self.timetable.clone(),
@@ -227,8 +240,9 @@ impl<'d> Session<'d> {
                 }
                 self.transit.put(self.clocks.shown(arrival.known_at), arrival);
             } else if let Some((at, arrival)) = self.transit.pop() {
-                let arrival = Arrival { event: Event { time: at, ..arrival.event }, ..arrival };
-                return self.show(&arrival, strategy).map(Some);
+                return self
+                    .show_late(&Arrival { event: Event { time: at, ..arrival.event }, ..arrival }, strategy)
+                    .map(Some);
             }
         }
     }
@@ -257,7 +271,7 @@ impl<'d> Session<'d> {
         self.held.ambiguous_bars = self.venue.floors.iter().map(|floor| floor.ambiguous_bars()).sum();
         self.held.mean_equity = self.equity.mean();
         let data = self.feed.lines().iter().map(DataSeen::of).collect();
-        let outside = self.timetable.outside();
+        let (outside, halts) = (self.timetable.outside(), self.timetable.halts_seen());
         let account = self.keeping.map(|keeping| keeping.record).unwrap_or_default();
         Ok(Record {
             blotter: self.blotter,
@@ -266,6 +280,7 @@ impl<'d> Session<'d> {
             held: self.held,
             data,
             outside,
+            halts,
             account,
         })
     }
@@ -277,7 +292,9 @@ impl<'d> Session<'d> {
         self.feed.read_on(oldest.saturating_sub(1)).map_err(|error| BacktestError::Data(Box::new(error)))
     }
 
-    /// What is due next happens: the event it makes for the strategy, if it asked to be woken.
+    /// What is due next happens: the event it makes for the strategy, if it asked to be woken. Apart from the loop, which turns
+    /// faster without what few events need.
+    #[inline(never)]
     fn act(&mut self, strategy: Option<&mut dyn Strategy>) -> Result<Option<Event>, BacktestError> {
         let Some((at, due)) = self.agenda.pop() else { return Ok(None) };
         if self.keeping.is_some() {

@@ -2,13 +2,14 @@
 
 use crate::sim2real::Timestamp;
 
+use super::halt::Halts;
 use super::hours::TradingHours;
 use super::known::Known;
 use super::rates::multiplied;
 use super::{
     Balance, Bar, Bracket, Calendar, Cash, Condition, CorporateAction, DepthBook, Hours, Increments, Instrument, Ledger,
     Link, Margin, OpenOrder, OrderId, OrderKind, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Terms,
-    Ticket,
+    Ticket, UnderHalt,
 };
 
 /// What brought an event about; in the order in which they come at one instant.
@@ -64,6 +65,7 @@ pub struct View<'a> {
     pub(super) ledger: &'a Ledger,
     pub(super) equity: Cash,
     pub(super) hours: &'a [Option<TradingHours<'a>>],
+    pub(super) halts: &'a [Halts<'a>],
 }
 
 impl<'a> View<'a> {
@@ -116,6 +118,7 @@ impl<'a> View<'a> {
     }
 
     /// The best price displayed on `side` (bids: [`Side::Buy`]), by the book or else the last quote.
+    #[inline]
     #[must_use]
     pub fn best(&self, instrument: usize, side: Side) -> Option<Price> {
         let known = self.known.get(instrument)?;
@@ -160,7 +163,14 @@ impl<'a> View<'a> {
         Some(self.hours.get(instrument)?.as_ref()?.calendar())
     }
 
+    /// The halt an instrument is in now: when it ends is not known.
+    #[must_use]
+    pub fn halt(&self, instrument: usize) -> Option<UnderHalt<'a>> {
+        self.halts.get(instrument)?.under_way(self.event.time)
+    }
+
     /// Our orders of an instrument that work, as far as is known, the oldest first.
+    #[inline]
     #[must_use]
     pub fn orders(&self, instrument: usize) -> &'a [OpenOrder] {
         self.known.get(instrument).map_or(&[], |known| &known.orders)

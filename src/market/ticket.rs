@@ -80,6 +80,7 @@ impl OrderKind {
     }
 
     /// The worst price it may trade at, where it has one.
+    #[inline]
     #[must_use]
     pub fn limit(self) -> Option<Price> {
         match self {

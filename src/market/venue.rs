@@ -7,17 +7,20 @@
 //!   waits. A resting order has a place in the queue at its price ([`QueueModel`]); it is filled when trades have used up
 //!   what stood ahead of it, or when others show a price at or beyond its own.
 //!
-//! A replayed history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only.
+//! A replayed history does not react to our orders: what an impact leaves behind is in the mechanisms' memory only. Orders that
+//! take pay it, and orders that wait do so in the market as own orders have moved it.
 
 mod auction;
 mod bars;
 mod by_order;
 mod displayed;
 mod floor;
+mod moved;
 mod path;
 mod queue;
 mod resting;
 mod shown;
+mod standing;
 mod taken;
 
 use serde::{Deserialize, Serialize};
@@ -25,7 +28,7 @@ use serde::{Deserialize, Serialize};
 use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
 
 use super::mechanism::charge_kind;
-use super::{AnotherFill, Book, ChargeKind, DepthBook, Execution, Increments, Quantity, Side};
+use super::{AnotherFill, Book, ChargeKind, DepthBook, Execution, Increments, Quantity, Side, WhileHalted};
 
 pub use path::Intrabar;
 pub use queue::QueueModel;
@@ -33,6 +36,7 @@ pub use queue::QueueModel;
 pub(super) use auction::Auctions;
 pub(super) use by_order::Others;
 pub(super) use floor::{Floor, Rules};
+use moved::Moved;
 pub(super) use resting::{Filled, Outcome, Resting, What};
 
 /// The price mechanisms start from where there are quotes. Where there are bars only it is the open.
@@ -96,6 +100,8 @@ pub struct Matching {
     pub limit_fill: LimitFill,
     /// How the queue at a price moves.
     pub queue: QueueModel,
+    /// What becomes of orders that come in a halt.
+    pub halted: WhileHalted,
 }
 
 /// The floors of all instruments, and what their laws are called.
@@ -139,14 +145,18 @@ impl Venue {
         let still = Thetas::single(&[]);
         // Prices of an order that walks the book are averages over several trades, which lie between ticks.
         let averages = assembly.modelled().contains(&"book_walk");
-        let at_plant = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Plant);
-        let conceding: Vec<&'static str> = at_plant.map(|about| about.name).collect();
-        let reporting = assembly.mechanisms().map(|(row, ..)| row.about()).filter(|about| about.site == Site::Observation);
-        let charges = reporting.map(|about| charge_kind(about.name)).collect();
+        let asks_queue = assembly.modelled().contains(&"queue_position");
+        // In the order in which a run has their laws, which is that of where they act.
+        let acting = |site| assembly.mechanisms().filter(move |(row, form, _)| row.site(*form) == site);
+        let conceding: Vec<&'static str> = acting(Site::Plant).map(|(row, ..)| row.about().name).collect();
+        let charges = acting(Site::Observation).map(|(row, ..)| charge_kind(row.about().name)).collect();
+        let lasts = |name: &&str| matches!(*name, "permanent_impact" | "transient_impact");
+        let lasting: Vec<usize> = conceding.iter().enumerate().filter(|(_, name)| lasts(name)).map(|(law, _)| law).collect();
         let floor = |(number, symbol): (usize, &&str)| {
             let run = assembly.run(&thetas, &still, setup.seed.child(symbol));
             let increments = setup.increments[number];
             let mut floor = Floor::new(number, increments, averages, conceding.len(), setup.rules, run);
+            (floor.asks_queue, floor.moved) = (asks_queue, Moved::by_laws(lasting.clone()));
             match setup.depth[number] {
                 Detail::Bars => floor.by_bars = true,
                 Detail::Quotes => {}
@@ -167,6 +177,7 @@ impl Floor {
     pub fn arrive(&mut self, orders: impl Iterator<Item = Resting>, at: Timestamp) {
         let first = self.resting.len();
         self.resting.extend(orders);
+        self.displace(at);
         let open = self.is_open();
         if !open || !self.by_bars {
             for k in first..self.resting.len() {

@@ -97,7 +97,7 @@ impl SweepPage {
             heading: self.title.clone(),
             badge: None,
             sections: vec![
-                Box::new(ListingTable { title: "The best runs", about: &self.about, listing: &self.best }),
+                Box::new(ListingTable { id: "listing", title: "The best runs", about: &self.about, listing: &self.best }),
                 Box::new(HeatMapTable { heat: self.heat.as_ref() }),
                 Box::new(Scatters { scatters: &self.scatters }),
             ],
@@ -123,7 +123,7 @@ impl WalkForwardPage {
             heading: self.title.clone(),
             badge: None,
             sections: vec![
-                Box::new(ListingTable { title: "Windows", about: &self.about, listing: &self.windows }),
+                Box::new(ListingTable { id: "listing", title: "Windows", about: &self.about, listing: &self.windows }),
                 Box::new(Equity { page: &out_of_sample }),
             ],
         };

@@ -42,4 +42,8 @@ pub fn same_every_way(backtest: &Backtest, record: &Record, strategy: &(impl Str
     let (fork, mut copy) = (session.fork().unwrap(), own.clone());
     assert_eq!(to_the_end(session, &mut own), *record, "stopped in the middle");
     assert_eq!(to_the_end(fork, &mut copy), *record, "forked in the middle");
+
+    let (mut session, mut own) = (backtest.start(), strategy.clone());
+    while session.advance(&mut own, 3).unwrap() {}
+    assert_eq!(session.finish().unwrap(), *record, "a few events at a time");
 }

@@ -151,12 +151,12 @@ fn quoted(history: &History, time: Timestamp) -> Vec<f64> {
 }
 
 /// Whether a fill is better than the best price there was, or began at a price that was not there: mechanisms may make a
-/// price worse than any that was traded, never better.
+/// price worse than any that was traded, never better. Where own orders had moved the market, the best there was had moved with it.
 fn outside(fill: &Fill, (low, high): (f64, f64)) -> bool {
-    let (price, room) = (fill.price.to_f64(), 1e-9 * high);
+    let (price, room, moved) = (fill.price.to_f64(), 1e-9 * high, fill.why.displaced.to_f64());
     let better = match fill.side {
-        Side::Buy => price < low - room,
-        Side::Sell => price > high + room,
+        Side::Buy => price < low + moved - room,
+        Side::Sell => price > high + moved + room,
     };
     let conceded = (fill.cost.spread_and_impact + fill.cost.rounding) / fill.quantity.to_f64();
     let met = price - fill.side.sign() * conceded;

@@ -14,9 +14,11 @@ mod need;
 mod participation_cap;
 mod permanent_impact;
 mod propagator;
+mod queue_position;
 #[cfg(test)]
 mod schedule;
 mod sqrt_impact;
+mod stale_quotes;
 mod textbook_slippage;
 mod transient_impact;
 mod volatility_slippage;
@@ -33,7 +35,9 @@ pub use lot_size::LotSize;
 pub use need::{Demanding, Lack, Need, needs};
 pub use participation_cap::ParticipationCap;
 pub use permanent_impact::PermanentImpact;
+pub use queue_position::QueuePosition;
 pub use sqrt_impact::SqrtImpact;
+pub use stale_quotes::StaleQuotes;
 pub use textbook_slippage::TextbookSlippage;
 pub use transient_impact::TransientImpact;
 pub use volatility_slippage::VolatilitySlippage;
@@ -55,7 +59,9 @@ pub static MECHANISMS: Registry<Execution> = &[
     &TransientImpact,
     &VolatilitySlippage,
     &AdverseSelection,
+    &QueuePosition,
     &TextbookSlippage,
+    &StaleQuotes,
     &Commission,
     &BorrowFee,
     &Funding,
@@ -74,5 +80,6 @@ pub static DEMANDING: &[&dyn Demanding] = &[
     &PermanentImpact,
     &TransientImpact,
     &VolatilitySlippage,
+    &QueuePosition,
     &TextbookSlippage,
 ];

@@ -1,6 +1,6 @@
 //! What mechanisms need to be known of the market: without it they would do nothing, unnoticed.
 
-use crate::market::{Execution, History, Instrument, OrderLog, Quotes};
+use crate::market::{Execution, History, Instrument, OrderLog, Quotes, Role};
 use crate::sim2real::{Mechanism, Timestamp};
 
 use super::DEMANDING;
@@ -18,6 +18,8 @@ pub enum Need {
     DailyVolume,
     /// How much the price moves in a day.
     DailyVolatility,
+    /// Queues at the prices at which orders rest.
+    Queues,
 }
 
 /// A mechanism that can do nothing without some data: a row of [`DEMANDING`], beside its row in the registry.
@@ -52,6 +54,7 @@ impl Need {
             Self::Volume => log.knows_volume(),
             Self::DailyVolume => average_daily_volume.is_some(),
             Self::DailyVolatility => daily_volatility.is_some(),
+            Self::Queues => log.has_a(Role::Maker) && display_sizes(log.tape().quotes()),
         }
     }
 
@@ -59,6 +62,7 @@ impl Need {
     #[must_use]
     pub fn lacking(self, instrument: &Instrument, history: &History) -> Option<Lack> {
         let quoted = !history.quotes().is_empty();
+        let has_book = !history.depth().is_empty() || !history.order_events().is_empty();
         let traded = || history.bars().iter().any(|bar| bar.volume > 0.0);
         let lack = |what, hint| Some(Lack { what, hint });
         match self {
@@ -76,6 +80,10 @@ impl Need {
             Self::DailyVolatility if instrument.daily_volatility.is_none() && days(history) <= DAYS_OF_VOLATILITY => lack(
                 "volatilities",
                 "add daily_volatility to [[instrument]], or more than a week of data: it is that of days that are over",
+            ),
+            Self::Queues if !has_book && !display_sizes(history.quotes()) => lack(
+                "sizes displayed at a price",
+                "add [[data]] with a book, or quotes that know sizes; on bars and trades alone nobody knows a queue",
             ),
             _ => None,
         }

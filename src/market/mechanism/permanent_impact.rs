@@ -15,6 +15,9 @@ use super::need::{Demanding, Need, known};
 /// depends on the sum of what was traded alone. Of laws by which each order moves the price for good by a function of its own
 /// size, only the linear one is free of round trips that gain (Huberman & Stanzl).
 ///
+/// Own orders that wait do so in the market as it was moved: after purchases those to buy are further from being filled, and those to
+/// sell nearer, where they take.
+///
 /// The tape does not react: where it was recorded while the orders were sent, it shows what they left, and the law finds
 /// nothing besides.
 ///
@@ -81,6 +84,7 @@ impl Law<Execution> for Displaced {
         let lanes = self.bps.iter().zip(&mut self.traded);
         for (((effect, met), order), (bps, traded)) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(lanes) {
             if !order.takes() {
+                effect.displaced += bps * (self.mean)(*traded, *traded) * order.mid * 1e-4;
                 continue;
             }
             let after = *traded + order.side.sign() * order.participation(met.volume);

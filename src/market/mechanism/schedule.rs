@@ -40,12 +40,22 @@ impl Child {
 
 /// What `law` adds to the price of `order` at `time` [s], one lane.
 pub(super) fn concession(law: &mut dyn Law<Execution>, time: f64, order: InFlight) -> f64 {
-    let met = Met { book: Book::at_price(order.decided_at, MID), reference: MID, volume: f64::INFINITY };
+    acted(law, time, order, 0.0).concession
+}
+
+/// What `law` does to `child` where so much is `displayed` at its price [units].
+pub(super) fn effect(law: &mut dyn Law<Execution>, child: Child, displayed: f64) -> ExecutionEffect {
+    acted(law, child.time, child.order(), displayed)
+}
+
+fn acted(law: &mut dyn Law<Execution>, time: f64, order: InFlight, displayed: f64) -> ExecutionEffect {
+    let book = Book::at_price(order.decided_at, MID);
+    let met = Met { displayed, ..Met::at(book, MID, f64::INFINITY) };
     let states = Execution.initial(&Thetas::single(&[]));
     let scene = Scene { dynamics: &Execution, states: &states, inputs: &[met], commands: &[order] };
     let mut effects = [ExecutionEffect::default()];
     law.act(Tick { index: 0, time, step: 0.0 }, &scene, &mut effects);
-    effects[0].concession
+    effects[0]
 }
 
 /// What each of `children` concedes to form `form` of `mechanism` with the values `theta` [bps of the mid].

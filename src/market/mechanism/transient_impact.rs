@@ -19,6 +19,8 @@ use super::propagator::Propagator;
 /// as both forms are, and impact linear in the quantity, no round trip gains (Gatheral; Alfonsi, Schied & Slynko); a
 /// square-root law with exponential decay would let one gain, which is why there is none here.
 ///
+/// Own orders that wait do so in the market as far as it is still moved.
+///
 /// The tape does not react: where it was recorded while the orders were sent, it shows what they left, and the law finds
 /// nothing besides. Orders follow each other by when they meet the market.
 ///
@@ -97,11 +99,15 @@ struct Decaying {
 
 impl Law<Execution> for Decaying {
     fn act(&mut self, tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
-        if !scene.commands.iter().any(|order| order.takes()) {
-            return;
-        }
         // Nothing is displaced before the first order, and no order comes before one that came before it.
         let seconds = if self.last.is_finite() { (tick.time - self.last).max(0.0) } else { 0.0 };
+        if !scene.commands.iter().any(|order| order.takes()) {
+            // Those that rest meet what is left by then, and leave nothing.
+            for ((effect, order), displaced) in effects.iter_mut().zip(scene.commands).zip(&self.displaced) {
+                effect.displaced += displaced.left_after(seconds) * order.mid * 1e-4;
+            }
+            return;
+        }
         self.last = self.last.max(tick.time);
         let lanes = self.bps.iter().zip(&mut self.displaced);
         for (((effect, met), order), (bps, displaced)) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(lanes)

@@ -1,7 +1,7 @@
 //! What happens at the exchange: rows of data meet the orders that wait there.
 
 use crate::market::agenda::{Due, Phase};
-use crate::market::line::RowKind;
+use crate::market::sources::RowKind;
 use crate::market::{Arrival, BacktestError, Event, EventKind};
 
 use super::Session;

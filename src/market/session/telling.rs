@@ -1,6 +1,6 @@
 //! What the strategy is told: what became known, what became of its orders; and what it asks for then.
 
-use crate::market::{Arrival, BacktestError, Cash, Event, EventKind, MoneyError, Orders, Price, Strategy, View};
+use crate::market::{Arrival, BacktestError, Bar, Cash, Event, EventKind, MoneyError, Orders, Price, Strategy, View};
 use crate::sim2real::Timestamp;
 
 use super::Session;
@@ -18,14 +18,48 @@ impl Session<'_> {
         self.decide(event, strategy)
     }
 
+    /// Shows what was on its way to the strategy.
+    #[inline(never)]
+    pub(super) fn show_late(&mut self, arrival: &Arrival, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {
+        self.show(arrival, strategy)
+    }
+
     #[inline(always)]
     pub(super) fn decide(&mut self, event: Event, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {
+        let equity = self.ask(event, strategy)?;
+        self.send_asked(event.time, equity);
+        Ok(event)
+    }
+
+    /// Asks the strategy, and gives the equity it decided on.
+    #[inline(always)]
+    fn ask(&mut self, event: Event, strategy: &mut dyn Strategy) -> Result<Cash, BacktestError> {
         let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
         self.account(event.time, equity);
         let (view, orders) = self.view(event, equity);
         strategy.on_event(&view, orders);
-        self.send_asked(event.time, equity);
-        Ok(event)
+        Ok(equity)
+    }
+
+    /// Shows the strategy a bar, where nothing else wants to be looked for; whether it asked for anything.
+    #[inline(always)]
+    pub(super) fn show_bar(
+        &mut self,
+        instrument: usize,
+        bar: &Bar,
+        strategy: &mut dyn Strategy,
+    ) -> Result<bool, BacktestError> {
+        let event = Event { time: bar.known_at, instrument, kind: EventKind::Bar };
+        let known = &mut self.known[instrument];
+        known.keep = strategy.lookback().max(1);
+        known.bars.push(*bar, known.keep);
+        self.value(event, bar.close, bar.volume).map_err(|error| self.money(event, error))?;
+        let equity = self.ask(event, strategy)?;
+        let asks = !self.orders.requests().is_empty();
+        if asks {
+            self.send_all(event.time, equity);
+        }
+        Ok(asks)
     }
 
     #[inline(always)]
@@ -38,6 +72,7 @@ impl Session<'_> {
             ledger: &self.ledger,
             equity,
             hours: self.timetable.each(),
+            halts: self.timetable.halts(),
         };
         (view, &mut self.orders)
     }
@@ -52,7 +87,7 @@ impl Session<'_> {
     /// Takes in what became known, and values what is held by it.
     #[inline(always)]
     fn learn(&mut self, arrival: &Arrival, keep: usize) -> Result<(), MoneyError> {
-        let Event { time, instrument, kind } = arrival.event;
+        let Event { instrument, kind, .. } = arrival.event;
         let (line, known) = (self.feed.line(instrument), &mut self.known[instrument]);
         known.keep = keep;
         let (price, volume) = match kind {
@@ -78,11 +113,17 @@ impl Session<'_> {
             EventKind::Timer => (None, 0.0),
         };
         let Some(price) = price else { return Ok(()) };
-        known.mark = Some(price);
-        self.daily[instrument].see(time, price, volume);
         if self.clocks.watches() {
-            self.clocks.watch(time, price.to_f64());
+            self.clocks.watch(arrival.event.time, price.to_f64());
         }
+        self.value(arrival.event, price, volume)
+    }
+
+    /// Values what is held by a price that became known, with the volume there was.
+    #[inline(always)]
+    fn value(&mut self, Event { time, instrument, .. }: Event, price: Price, volume: f64) -> Result<(), MoneyError> {
+        self.known[instrument].mark = Some(price);
+        self.daily[instrument].see(time, price, volume);
         self.ledger.mark(instrument, price)
     }
 

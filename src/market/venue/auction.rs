@@ -13,8 +13,9 @@
 //!
 //! Source: NYSE rules 7.35A (core open) and 7.35B (closing auction), for what is approximated.
 
-use crate::market::line::{Line, RowKind};
-use crate::market::{Book, OrderKind, Price, Quantity, Reason, Side, TimeInForce};
+use crate::market::line::Line;
+use crate::market::sources::RowKind;
+use crate::market::{Book, OrderKind, Price, Quantity, Reason, Side, TimeInForce, WhileHalted};
 use crate::sim2real::Timestamp;
 
 use super::floor::{Floor, Offer};
@@ -71,6 +72,8 @@ pub(in crate::market) struct Auctions {
     /// The opening of the day is still to come.
     to_open: bool,
     last: Last,
+    /// Trading is halted.
+    halted: bool,
 }
 
 impl Auctions {
@@ -82,7 +85,12 @@ impl Auctions {
             (true, true) => Told::Both,
             (false, _) => Told::Traded,
         };
-        Self { doors: Doors::Closed, told, to_open: false, last: Last::None }
+        Self { doors: Doors::Closed, told, to_open: false, last: Last::None, halted: false }
+    }
+
+    /// Those of a floor without hours, which is open but for halts.
+    pub fn always(line: &Line<'_>) -> Self {
+        Self { doors: Doors::Open, ..Self::of(line) }
     }
 
     /// A session begins: what is known of its price is what is displayed, where its market was open before.
@@ -96,7 +104,7 @@ impl Floor {
     /// Whether orders meet what is displayed.
     #[inline]
     pub(super) fn is_open(&self) -> bool {
-        self.auctions.as_ref().is_none_or(|auctions| auctions.doors == Doors::Open)
+        self.auctions.as_ref().is_none_or(|auctions| auctions.doors == Doors::Open && !auctions.halted)
     }
 
     /// The session is over.
@@ -128,9 +136,36 @@ impl Floor {
         }
     }
 
+    /// Trading is halted.
+    pub fn halt(&mut self) {
+        if let Some(auctions) = &mut self.auctions {
+            auctions.halted = true;
+        }
+    }
+
+    /// Trading goes on where it was halted: with the first price that is shown from now on.
+    pub fn resume(&mut self) {
+        let Some(auctions) = &mut self.auctions else { return };
+        if !std::mem::take(&mut auctions.halted) || auctions.doors == Doors::Closed || self.by_bars {
+            return;
+        }
+        auctions.doors = Doors::Opening;
+        if !matches!(self.shown, Shown::Depth(_)) {
+            self.shown = Shown::Nothing;
+        }
+        self.taken = Taken::default();
+    }
+
     /// Order `k` arrives, and the market does not trade: it waits, or is over.
     pub(super) fn wait_for_open(&mut self, k: usize, at: Timestamp) {
         let order = self.resting[k];
+        if self.auctions.is_some_and(|auctions| auctions.halted) {
+            let waits = !matches!(order.time_in_force, TimeInForce::ImmediateOrCancel | TimeInForce::FillOrKill);
+            if self.rules.halted == WhileHalted::Refuse || !waits {
+                self.end(k, at, Reason::Halted);
+            }
+            return;
+        }
         let closed = self.auctions.is_some_and(|auctions| auctions.doors == Doors::Closed);
         if order.tradable() <= Quantity::ZERO {
             return;
@@ -148,7 +183,7 @@ impl Floor {
         let Some(auctions) = self.auctions else { return };
         let opens = auctions.doors == Doors::Opening;
         let holds = auctions.to_open && auctions.told == Told::Displayed && auctions.doors != Doors::Closed;
-        let tells = !by_trade || auctions.told == Told::Traded;
+        let tells = (!by_trade || auctions.told == Told::Traded) && !auctions.halted;
         if !(opens || holds) || !tells || !self.shows_price() {
             return;
         }
@@ -159,6 +194,7 @@ impl Floor {
             self.open_at(at, None);
         }
         if opens {
+            self.displace(at);
             for k in 0..self.resting.len() {
                 self.resting[k].place = Place::default();
                 self.meet_shown(k, at);
@@ -174,7 +210,8 @@ impl Floor {
 
     /// A trade is printed, in a session or out of it: the first of a day is its opening.
     pub(super) fn heed_print(&mut self, price: Price, size: f64, at: Timestamp) {
-        let Some(auctions) = &mut self.auctions else { return };
+        // What is printed in a halt was traded before it.
+        let Some(auctions) = self.auctions.as_mut().filter(|auctions| !auctions.halted) else { return };
         let traded = Traded { price, size };
         auctions.last = Last::Traded(traded);
         if auctions.to_open && auctions.doors != Doors::Closed {
@@ -202,7 +239,10 @@ impl Floor {
 
     /// The day closes at `at`; `traded` says whether anything happened in the session that does.
     pub fn close_at(&mut self, at: Timestamp, traded: bool) {
-        let last = self.auctions.filter(|_| traded && !self.by_bars).map_or(Last::None, |auctions| auctions.last);
+        let last = self
+            .auctions
+            .filter(|auctions| traded && !self.by_bars && !auctions.halted)
+            .map_or(Last::None, |auctions| auctions.last);
         self.taken = Taken::default();
         for k in 0..self.resting.len() {
             let order = self.resting[k];
@@ -227,7 +267,7 @@ impl Floor {
             None => (self.touch_price(order.side), self.offer_shown(order.side, at)),
         };
         let (Some(price), Some(offer)) = (price, offer) else { return self.end(k, at, Reason::NoAuction) };
-        if order.accepts(price) {
+        if self.moved.reaches(&order, price) {
             self.take(k, &offer, order.tradable());
         }
         if self.resting[k].left > Quantity::ZERO {

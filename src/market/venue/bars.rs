@@ -18,13 +18,15 @@ impl Floor {
         self.taken = Taken::of_bars();
         let at = bar.open_at;
         let offer = self.offer(bar, at, bar.open);
+        self.displace_by(at, bar.open.to_f64());
+        let open = bar.open.plus(self.moved.by());
         for k in 0..self.resting.len() {
             let order = &mut self.resting[k];
             if order.from > at || order.tradable() <= Quantity::ZERO {
                 continue;
             }
-            order.follow(bar.open);
-            if order.waits() && order.set_off_by(bar.open) {
+            order.follow(open);
+            if order.waits() && order.set_off_by(open) {
                 order.set_off();
                 let id = order.id;
                 self.tell(id, at, super::What::SetOff);
@@ -32,9 +34,9 @@ impl Floor {
             let order = &self.resting[k];
             let takes = match order.kind {
                 OrderKind::Market => true,
-                OrderKind::Limit { .. } => order.accepts(bar.open),
+                OrderKind::Limit { .. } => self.moved.reaches(order, bar.open),
                 OrderKind::MarketOnOpen => first_of_session,
-                OrderKind::LimitOnOpen { .. } => first_of_session && order.accepts(bar.open),
+                OrderKind::LimitOnOpen { .. } => first_of_session && self.moved.reaches(order, bar.open),
                 _ => false,
             };
             self.meet_at(k, &offer, takes, first_of_session);
@@ -49,7 +51,9 @@ impl Floor {
             return self.end(k, offer.at, Reason::PostOnly);
         }
         // With bars all the volume there is stands at the price: a cap alone can leave something over.
-        let whole = order.time_in_force != TimeInForce::FillOrKill || self.room(k, offer) >= order.tradable();
+        let room = self.room(k, offer);
+        let whole = order.time_in_force != TimeInForce::FillOrKill
+            || room >= order.tradable() && self.within_limit(k, offer, room) >= order.tradable();
         if takes && whole {
             self.take(k, offer, order.tradable());
         }
@@ -91,6 +95,8 @@ impl Floor {
         if !self.resting.iter().any(|order| order.from <= closes_for.unwrap_or(bar.open_at)) {
             return;
         }
+        // What came within the bar is not known in its order: it is moved as the market stood when it opened.
+        self.displace_by(bar.open_at, bar.open.to_f64());
         if self.awaits_open(bar.open_at) {
             let way = self.way(bar);
             for leg in way.windows(2) {
@@ -109,7 +115,7 @@ impl Floor {
         let (mut above, mut below) = (false, false);
         for order in self.resting.iter().filter(|o| o.from <= bar.open_at) {
             entry[usize::from(order.side == Side::Sell)] |= order.tradable() > Quantity::ZERO;
-            for price in [order.limit(), order.trigger()].into_iter().flatten() {
+            for price in [self.level_of(order), self.trigger_of(order)].into_iter().flatten() {
                 above |= price > bar.open && price <= bar.high;
                 below |= price < bar.open && price >= bar.low;
             }
@@ -145,7 +151,9 @@ impl Floor {
             let offer = self.offer(bar, at, price);
             match self.resting[k].kind {
                 OrderKind::Market => self.meet_at(k, &offer, true, false),
-                OrderKind::Limit { .. } if self.resting[k].accepts(price) && before.1 != self.resting[k].kind => {
+                OrderKind::Limit { .. }
+                    if self.moved.accepts(&self.resting[k], price) && before.1 != self.resting[k].kind =>
+                {
                     self.meet_at(k, &offer, true, false);
                 }
                 _ => {
@@ -161,11 +169,22 @@ impl Floor {
                 self.resting[k].from = bar.open_at + 1;
             }
         }
+        let moved = to.plus(self.moved.by());
         for order in &mut self.resting {
             if order.from <= bar.open_at {
-                order.follow(to);
+                order.follow(moved);
             }
         }
+    }
+
+    /// The recorded price at which an order waits that has a limit.
+    fn level_of(&self, order: &Resting) -> Option<Price> {
+        order.limit().map(|limit| self.moved.level(order.side, limit))
+    }
+
+    /// The recorded price that sets an order off, where it waits for one.
+    fn trigger_of(&self, order: &Resting) -> Option<Price> {
+        order.trigger().map(|trigger| trigger.minus(self.moved.by()))
     }
 
     /// The first order that the way from `from` to `to` fills or sets off, and the price at which it does.
@@ -176,8 +195,11 @@ impl Floor {
             }
             let (price, far) = match order.kind {
                 OrderKind::Market => return Some(from),
-                OrderKind::Limit { price } => (price, self.through(order.side, price)),
-                _ if order.waits() => (order.trigger()?, order.trigger()?),
+                OrderKind::Limit { price } => {
+                    let level = self.moved.level(order.side, price);
+                    (level, self.through(order.side, level))
+                }
+                _ if order.waits() => (self.trigger_of(order)?, self.trigger_of(order)?),
                 _ => return None,
             };
             let rising = to >= from;
@@ -214,7 +236,7 @@ impl Floor {
             if !on_close || order.from > by {
                 continue;
             }
-            if order.accepts(bar.close) {
+            if self.moved.reaches(&order, bar.close) {
                 self.take(k, &offer, order.tradable());
             }
             if self.resting[k].left > Quantity::ZERO {

@@ -80,7 +80,8 @@ impl Floor {
         let Shown::Depth(book) = &mut self.shown else { return };
         let Some(left) = self.others.apply(event, book) else { return };
         for order in &mut self.resting {
-            if order.side == left.side && order.limit() == Some(left.price) && left.since <= order.place.joined_after {
+            let joined = order.limit().map(|limit| self.moved.level(order.side, limit));
+            if order.side == left.side && joined == Some(left.price) && left.since <= order.place.joined_after {
                 order.place.left_ahead(left.size);
             }
         }

@@ -6,7 +6,6 @@ use crate::market::{
 use crate::sim2real::Timestamp;
 
 use super::floor::{Floor, Offer};
-use super::queue::Place;
 use super::shown::Shown;
 use super::taken::Taken;
 use super::{LimitFill, Resting, What};
@@ -18,13 +17,14 @@ impl Floor {
         if order.tradable() <= Quantity::ZERO {
             return;
         }
-        let Some(touch) = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok()) else {
+        let Some(touch) = self.touch_price(order.side) else {
             // Nothing to take: what cannot wait is over, the rest waits.
             return self.wait_or_end(k, at);
         };
-        self.resting[k].follow(touch);
+        let moved = touch.plus(self.moved.by());
+        self.resting[k].follow(moved);
         if order.waits() {
-            if !self.resting[k].set_off_by(touch) {
+            if !self.resting[k].set_off_by(moved) {
                 return self.wait_or_end(k, at);
             }
             self.resting[k].set_off();
@@ -33,39 +33,45 @@ impl Floor {
         let order = self.resting[k];
         let takes = match order.kind {
             OrderKind::Market => true,
-            OrderKind::Limit { .. } => order.accepts(touch),
+            OrderKind::Limit { .. } => self.moved.reaches(&order, touch),
             _ => false,
         };
         if takes && order.condition == Condition::PostOnly {
             return self.end(k, at, Reason::PostOnly);
         }
-        if takes {
-            // A market order takes whatever its size, as diagnosis has it; a limit order what is displayed within its limit.
-            let within = match order.kind {
-                OrderKind::Market => Quantity(i64::MAX),
-                _ => quantity_of(self.takable(&order)),
-            };
-            let whole = within >= order.tradable();
-            if (whole || order.time_in_force != TimeInForce::FillOrKill)
-                && let Some(offer) = self.offer_shown(order.side, at)
-            {
-                self.take(k, &offer, within);
-                let best = self.best_taken(order.side);
-                self.taken.from(order.side, best);
-            }
+        if takes && let Some(offer) = self.offer_shown(order.side, at) {
+            self.take_shown(k, &offer);
         }
         self.wait_or_end(k, at);
+    }
+
+    /// Order `k` takes of what is displayed: a market order whatever its size, as diagnosis has it; a limit order what is there
+    /// within its limit; one to be filled whole, all or nothing.
+    pub(super) fn take_shown(&mut self, k: usize, offer: &Offer) {
+        let order = self.resting[k];
+        let within = match order.kind {
+            OrderKind::Market => Quantity(i64::MAX),
+            _ => quantity_of(self.takable(&order)),
+        };
+        let whole = order.time_in_force != TimeInForce::FillOrKill
+            || within >= order.tradable() && self.within_limit(k, offer, order.tradable()) >= order.tradable();
+        if whole {
+            self.take(k, offer, within);
+            let best = self.best_taken(order.side);
+            self.taken.from(order.side, best);
+        }
     }
 
     /// What an order finds within its limit [units]. What was taken of it already is not there a second time, though a
     /// replayed market goes on to show it.
     fn takable(&self, order: &Resting) -> f64 {
-        (self.shown.takable(order.side, order.limit()) - self.taken.by(order.side)).max(0.0)
+        let limit = order.limit().map(|limit| limit.minus(self.moved.by()));
+        (self.shown.takable(order.side, limit) - self.taken.by(order.side)).max(0.0)
     }
 
     /// Best price an order of `side` can take, and what is displayed there.
     fn best_taken(&self, side: Side) -> Option<(Price, f64)> {
-        let touch = Price::nearest(self.shown.touch(side)?).ok()?;
+        let touch = self.shown.touch_price(side)?;
         Some((touch, self.shown.displayed_at(side.opposite(), touch)))
     }
 
@@ -83,15 +89,7 @@ impl Floor {
         };
         match reason {
             Some(reason) => self.end(k, at, reason),
-            None => self.join(k),
-        }
-    }
-
-    /// An order with a limit joins the end of the queue at its price.
-    fn join(&mut self, k: usize) {
-        let order = &self.resting[k];
-        if let (OrderKind::Limit { price }, true) = (order.kind, order.place == Place::default()) {
-            self.resting[k].place = Place::behind(self.shown.displayed_at(order.side, price), self.others.events());
+            None => self.join(k, at),
         }
     }
 
@@ -107,14 +105,15 @@ impl Floor {
             return;
         }
         let before = std::mem::replace(&mut self.shown, Shown::Quote(book));
-        for order in &mut self.resting {
+        for k in 0..self.resting.len() {
+            let order = &mut self.resting[k];
             if let OrderKind::Limit { price } = order.kind {
+                let price = self.moved.level(order.side, price);
                 let (was, is) = (before.displayed_at(order.side, price), self.shown.displayed_at(order.side, price));
                 if was.is_finite() && is.is_finite() {
                     order.place.displayed(self.rules.queue, was, is);
                 } else if is.is_finite() {
-                    // The price has come into view: no more can be ahead than is there.
-                    order.place.displayed(self.rules.queue, is, is);
+                    self.come_into_view(k, is, at);
                 }
             }
         }
@@ -127,17 +126,14 @@ impl Floor {
         let Shown::Depth(book) = &mut self.shown else { return };
         if !self.resting.is_empty() {
             for order in &mut self.resting {
+                // A snapshot says anew what is there; until it does, nothing is known to have gone.
                 if order.side == change.side
                     && let OrderKind::Limit { price } = order.kind
+                    && self.moved.level(order.side, price) == change.price
+                    && change.action == DepthAction::Set
                 {
-                    let was = book.size(order.side, price);
-                    match change.action {
-                        DepthAction::Set if price == change.price => {
-                            order.place.displayed(self.rules.queue, was, change.size);
-                        }
-                        // A snapshot says anew what is there; until it does, nothing is known to have gone.
-                        _ => {}
-                    }
+                    let was = book.size(order.side, change.price);
+                    order.place.displayed(self.rules.queue, was, change.size);
                 }
             }
         }
@@ -159,12 +155,24 @@ impl Floor {
         if self.resting.is_empty() || !self.is_open() {
             return;
         }
+        self.displace(at);
+        let (to_buy, to_sell) = (self.touch_price(Side::Buy), self.touch_price(Side::Sell));
         for k in 0..self.resting.len() {
+            let order = &self.resting[k];
+            let touch = if order.side == Side::Buy { to_buy } else { to_sell };
+            // What rests behind the touch, as nearly all does, has nothing to do with it.
+            if matches!(order.kind, OrderKind::Limit { .. }) && touch.is_none_or(|touch| !self.moved.reaches(order, touch)) {
+                continue;
+            }
             self.look_at(k, at);
         }
-        self.sweep(at);
+        // What is over has been told.
+        if !self.is_quiet() {
+            self.sweep(at);
+        }
     }
 
+    /// Order `k` meets what is shown, which reaches its limit if it has one, or would if own orders had not moved the market.
     fn look_at(&mut self, k: usize, at: Timestamp) {
         let order = self.resting[k];
         if order.tradable() <= Quantity::ZERO {
@@ -172,11 +180,11 @@ impl Floor {
         }
         match order.kind {
             OrderKind::Limit { price } => {
-                let crossed = self.shown.touch(order.side).and_then(|touch| Price::nearest(touch).ok());
+                let crossed = self.touch_price(order.side);
                 let Some(offer) =
-                    crossed.filter(|touch| order.side.accepts(*touch, price)).and_then(|_| self.offer_at(price, at))
+                    crossed.filter(|touch| self.moved.accepts(&order, *touch)).and_then(|_| self.offer_at(price, at))
                 else {
-                    return;
+                    return self.take_moved(k, at);
                 };
                 // What we took ourselves is shown on; nobody new is there.
                 if self.taken.by(order.side) > 0.0 && self.takable(&order) <= 0.0 {
@@ -186,7 +194,7 @@ impl Floor {
                 self.make(k, &offer, order.tradable());
             }
             _ if order.waits() => {
-                let Some(price) = self.touch_price(order.side) else { return };
+                let Some(price) = self.touch_price(order.side).map(|touch| touch.plus(self.moved.by())) else { return };
                 self.resting[k].follow(price);
                 if self.resting[k].set_off_by(price) {
                     self.meet_shown(k, at);
@@ -208,14 +216,16 @@ impl Floor {
         if self.resting.is_empty() || !self.is_open() {
             return;
         }
+        self.displace(at);
+        let moved = price.plus(self.moved.by());
         for k in 0..self.resting.len() {
             let order = self.resting[k];
             if order.tradable() <= Quantity::ZERO {
                 continue;
             }
             if order.waits() {
-                self.resting[k].follow(price);
-                if self.resting[k].set_off_by(price) {
+                self.resting[k].follow(moved);
+                if self.resting[k].set_off_by(moved) {
                     self.resting[k].set_off();
                     self.tell(order.id, at, What::SetOff);
                     self.meet_shown(k, at);
@@ -229,10 +239,10 @@ impl Floor {
                 continue;
             };
             // A trade that took from our own side says nothing of whoever rests on the other.
-            if print.aggressor == Some(order.side) || !order.side.accepts(price, limit) {
+            if print.aggressor == Some(order.side) || !self.moved.accepts(&order, price) {
                 continue;
             }
-            let reached = if price == limit {
+            let reached = if price == self.moved.level(order.side, limit) {
                 match (self.rules.limit_fill, &self.shown) {
                     // Without a book nobody knows what stands ahead: the price has to go beyond the limit.
                     (LimitFill::Through, Shown::Last(_)) => 0.0,
@@ -251,9 +261,9 @@ impl Floor {
         self.sweep(at);
     }
 
-    /// The best price an order of `side` can take, which sets a stop of that side off.
+    /// The best price recorded that an order of `side` can take.
     pub(super) fn touch_price(&self, side: Side) -> Option<Price> {
-        self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok())
+        self.shown.touch_price(side)
     }
 
     /// What an order of `side` can take now.
@@ -283,7 +293,7 @@ impl Floor {
     /// Lowest and highest price displayed on the inside.
     fn band(&self, mid: f64) -> [Price; 2] {
         let mid = Price::nearest(mid).unwrap_or_default();
-        let of = |side| self.shown.touch(side).and_then(|touch| Price::nearest(touch).ok()).unwrap_or(mid);
+        let of = |side| self.shown.touch_price(side).unwrap_or(mid);
         [of(Side::Sell).min(mid), of(Side::Buy).max(mid)]
     }
 

@@ -3,12 +3,13 @@
 use crate::market::account::Ratio;
 use crate::market::{
     AnotherFill, Book, Condition, Execution, InFlight, Increments, Link, Met, OrderId, Price, Quantity, Reason, Reference,
-    Role, Side,
+    Role, Side, WhileHalted,
 };
 use crate::sim2real::{Run, Tick, Timestamp};
 
 use super::auction::Auctions;
 use super::by_order::Others;
+use super::moved::Moved;
 use super::queue::Place;
 use super::resting::{Filled, Outcome, Resting, What};
 use super::shown::Shown;
@@ -22,6 +23,7 @@ pub(in crate::market) struct Rules {
     pub intrabar: Intrabar,
     pub limit_fill: LimitFill,
     pub queue: QueueModel,
+    pub halted: WhileHalted,
     /// The first message's time is this of the run [ns]: laws count from it.
     pub origin: Timestamp,
 }
@@ -63,6 +65,10 @@ pub(in crate::market) struct Floor {
     pub(super) by_bars: bool,
     /// The data know the orders of others one by one.
     pub(super) by_order: bool,
+    /// A law has something to say of the queues that orders join.
+    pub(super) asks_queue: bool,
+    /// How far own orders have moved the market.
+    pub(super) moved: Moved,
     pub(super) others: Others,
     /// Its hours, where they are known; else it never closes.
     pub auctions: Option<Auctions>,
@@ -99,6 +105,8 @@ impl Floor {
             ambiguous: 0,
             by_bars: false,
             by_order: false,
+            asks_queue: false,
+            moved: Moved::default(),
             others: Others::default(),
             auctions: None,
             messages: 0,
@@ -127,7 +135,7 @@ impl Floor {
     pub fn charge(&mut self, held: &InFlight, mid: f64, now: Timestamp, mut seen: impl FnMut(usize, f64)) {
         let tick = self.tick(now);
         self.run.deliver(&[held.as_a(Role::Holder).arriving(now)]);
-        self.run.advance(tick, |_| Met { book: Book::at_price(now, mid), reference: mid, volume: f64::INFINITY });
+        self.run.advance(tick, |_| Met::at(Book::at_price(now, mid), mid, f64::INFINITY));
         self.run.observe_seen(tick.time, |law, reports| seen(law, reports.first().map_or(0.0, |report| report.fee)));
     }
 
@@ -157,6 +165,7 @@ impl Floor {
             wanted = wanted.min(self.increments.whole_lots(Quantity::nearest(left.min(9e9)).unwrap_or(wanted)));
         }
         self.resting[k].met = true;
+        wanted = self.within_limit(k, offer, wanted);
         if wanted <= Quantity::ZERO {
             return;
         }
@@ -195,9 +204,9 @@ impl Floor {
     }
 
     /// Lets an order meet an offer: price, part filled, quantity and fee.
-    fn meet(&mut self, arriving: &InFlight, offer: &Offer) -> (f64, f64, f64, f64) {
+    pub(super) fn meet(&mut self, arriving: &InFlight, offer: &Offer) -> (f64, f64, f64, f64) {
         let tick = self.tick(offer.at);
-        let met = Met { book: offer.book, reference: offer.reference, volume: offer.volume };
+        let met = Met::at(offer.book, offer.reference, offer.volume);
         self.run.deliver(&[*arriving]);
         let (concessions, mut before) = (&mut self.concessions, 0.0);
         self.run.advance_seen(
@@ -242,7 +251,8 @@ impl Floor {
             fee,
             queued_behind,
             row: offer.row,
-            band: offer.band,
+            band: offer.band.map(|price| price.plus(self.moved.by())),
+            displaced: self.moved.by(),
         };
         self.terms.extend_from_slice(&self.concessions);
         self.tell(id, offer.at, What::Filled(filled));
@@ -280,11 +290,12 @@ impl Floor {
 
     /// What the fill of one order does to those it is linked with.
     fn settle_links(&mut self, id: OrderId, link: Link, quantity: Quantity, at: Timestamp) {
-        let mut over = Vec::new();
-        for order in self.resting.iter_mut().filter(|order| order.id != id) {
+        let (mut over, mut released) = (Vec::new(), Vec::new());
+        for (k, order) in self.resting.iter_mut().enumerate().filter(|(_, order)| order.id != id) {
             if order.link == (Link::ChildOf { parent: id }) {
                 // Children work for as much as their parent has filled.
                 order.released = (order.released + quantity).min(order.left);
+                released.push(k);
             } else if link != Link::Alone && order.link == link {
                 order.left = order.left - quantity;
                 order.released = (order.released - quantity).min(order.left).max(Quantity::ZERO);
@@ -295,6 +306,10 @@ impl Floor {
         }
         for id in over {
             self.tell(id, at, What::Ended(Reason::Linked));
+        }
+        if !self.by_bars && self.is_open() {
+            // From now on they stand in a queue.
+            released.into_iter().for_each(|k| self.join(k, at));
         }
     }
 
@@ -358,6 +373,7 @@ impl Floor {
         } else if (grows || price.is_some()) && !self.by_bars && self.is_open() {
             // What may now take does, and what must not is over.
             self.resting[k].place = Place::default();
+            self.displace(at);
             self.meet_shown(k, at);
         }
         self.sweep(at);

@@ -70,8 +70,10 @@ impl QueueModel {
 /// The place of one resting order in the queue at its price.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(in crate::market) struct Place {
-    /// What stands ahead of it [units].
+    /// What stands ahead of it of what is displayed [units].
     pub(super) ahead: f64,
+    /// What stands behind that and still ahead of it, though it is not displayed [units]: trades reach it before the order.
+    beyond: f64,
     /// What stood ahead when it joined [units].
     pub(super) joined_behind: f64,
     /// How many events of single orders there had been when it joined: whoever joined by one of these stands ahead.
@@ -81,9 +83,9 @@ pub(in crate::market) struct Place {
 }
 
 impl Place {
-    /// At the end of a queue of `displayed` [units].
-    pub fn behind(displayed: f64, joined_after: u64) -> Self {
-        Self { ahead: displayed, joined_behind: displayed, joined_after, traded: 0.0 }
+    /// At the end of a queue of `displayed` [units], and of `beyond` [units] that nobody sees.
+    pub fn behind(displayed: f64, beyond: f64, joined_after: u64) -> Self {
+        Self { ahead: displayed, beyond, joined_behind: displayed + beyond, joined_after, traded: 0.0 }
     }
 
     /// `size` [units] are traded at its price: what of it reaches the order.
@@ -94,9 +96,25 @@ impl Place {
         reaches
     }
 
-    /// What of a trade of `size` [units] would reach the order.
-    pub fn reached(&self, size: f64) -> f64 {
-        (size - self.ahead).max(0.0)
+    /// The same where the data say themselves whose orders ahead are gone.
+    pub fn reached(&mut self, size: f64) -> f64 {
+        let past = (size - self.ahead).max(0.0);
+        let reaches = (past - self.beyond).max(0.0);
+        self.beyond = (self.beyond - past).max(0.0);
+        reaches
+    }
+
+    /// Whether nobody knows what stands ahead.
+    pub fn is_unknown(&self) -> bool {
+        self.ahead.is_infinite()
+    }
+
+    /// Its price has come into view, where `displayed` [units] are: no more of them can be ahead; what stands `beyond` [units] is
+    /// said where it was not known before.
+    pub fn in_view(&mut self, displayed: f64, beyond: Option<f64>) {
+        self.ahead = self.ahead.min(displayed.max(0.0));
+        self.beyond = beyond.unwrap_or(self.beyond);
+        self.traded = 0.0;
     }
 
     /// What is displayed at its price went from `before` to `after` [units].
@@ -115,6 +133,7 @@ impl Place {
     /// One unit of before is so many `units` now.
     pub fn split(&mut self, units: f64) {
         self.ahead *= units;
+        self.beyond *= units;
         self.joined_behind *= units;
         self.traded *= units;
     }
@@ -134,7 +153,7 @@ mod tests {
     fn cancellations_are_shared_as_the_model_says() {
         // 60 ahead and 40 behind; 10 are cancelled.
         let after = |model: QueueModel| {
-            let mut place = Place::behind(60.0, 0);
+            let mut place = Place::behind(60.0, 0.0, 0);
             place.displayed(model, 100.0, 90.0);
             place.ahead
         };
@@ -148,7 +167,7 @@ mod tests {
 
     #[test]
     fn what_was_traded_is_not_counted_again_as_cancelled() {
-        let mut place = Place::behind(60.0, 0);
+        let mut place = Place::behind(60.0, 0.0, 0);
         assert_eq!(place.traded(25.0), 0.0);
         assert_eq!(place.ahead, 35.0);
         place.displayed(QueueModel::Proportional, 100.0, 75.0);
@@ -162,24 +181,28 @@ mod tests {
         #[test]
         fn a_queue_only_moves_forward(
             start in 0.0..1e3_f64,
+            beyond in prop_oneof![Just(0.0), 0.0..500.0_f64],
             steps in proptest::collection::vec((any::<bool>(), 0.0..300.0_f64), 0..60),
             model in prop_oneof![
                 Just(QueueModel::Trades), Just(QueueModel::Proportional), Just(QueueModel::Log),
                 (0.1..5.0_f64).prop_map(|exponent| QueueModel::Power { exponent })
             ],
         ) {
-            let (mut place, mut shown) = (Place::behind(start, 0), start);
+            let (mut place, mut shown) = (Place::behind(start, beyond, 0), start);
             for (trade, size) in steps {
-                let before = place.ahead;
+                let (before, unseen) = (place.ahead, place.beyond);
                 if trade {
                     let reached = place.traded(size);
-                    prop_assert!(reached >= 0.0 && reached <= size);
+                    prop_assert!((reached - (size - before - unseen).max(0.0)).abs() < 1e-9);
+                    // What nobody sees is used up by what comes past all that is displayed.
+                    prop_assert!((unseen - place.beyond - (size - before).clamp(0.0, unseen)).abs() < 1e-9);
                 } else {
                     place.displayed(model, shown, size);
                     shown = size;
                     prop_assert!(place.ahead <= shown);
                 }
                 prop_assert!(place.ahead >= 0.0 && place.ahead <= before && place.ahead.is_finite());
+                prop_assert!(place.beyond >= 0.0 && place.beyond <= unseen);
             }
         }
     }

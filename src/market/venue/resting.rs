@@ -130,11 +130,6 @@ impl Resting {
         order.average_daily_volume = order.average_daily_volume.map(|volume| volume * units);
         true
     }
-
-    /// Whether it may trade at `price`.
-    pub fn accepts(&self, price: Price) -> bool {
-        self.limit().is_none_or(|limit| self.side.accepts(price, limit))
-    }
 }
 
 /// What became of an order at the venue.
@@ -174,6 +169,8 @@ pub(in crate::market) struct Filled {
     pub queued_behind: f64,
     /// Row of the data that brought it about, counted among rows of their kind.
     pub row: usize,
-    /// Lowest and highest price the data show for the time of the fill.
+    /// Lowest and highest price the data show for the time of the fill, moved as own orders have moved the market.
     pub band: [Price; 2],
+    /// By how much they have.
+    pub displaced: Price,
 }

@@ -29,6 +29,17 @@ impl Shown {
         }
     }
 
+    /// Best price an order of `side` can take, exactly.
+    #[inline]
+    pub fn touch_price(&self, side: Side) -> Option<Price> {
+        match self {
+            Self::Nothing => None,
+            Self::Quote(book) => Price::nearest(book.touch(side)?).ok(),
+            Self::Depth(depth) => depth.best(side.opposite()),
+            Self::Last(price) => Some(*price),
+        }
+    }
+
     pub fn mid(&self) -> Option<f64> {
         Some(0.5 * (self.touch(Side::Buy)? + self.touch(Side::Sell)?))
     }

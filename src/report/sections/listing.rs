@@ -6,6 +6,7 @@ use crate::report::section::{ReportError, Section, fill};
 use crate::report::sweep::Listing;
 
 pub(in crate::report) struct ListingTable<'a> {
+    pub id: &'static str,
     pub title: &'static str,
     pub about: &'a [String],
     pub listing: &'a Listing,
@@ -13,7 +14,7 @@ pub(in crate::report) struct ListingTable<'a> {
 
 impl Section for ListingTable<'_> {
     fn id(&self) -> &'static str {
-        "listing"
+        self.id
     }
 
     fn title(&self) -> &'static str {

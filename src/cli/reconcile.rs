@@ -1,0 +1,184 @@
+//! `trueup reconcile`: a backtest beside a paper log, order by order.
+
+mod junit;
+mod told;
+mod tolerances;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::io::{InputError, OutputFolder, Overwrite, RunFile, table_in};
+use crate::market::paper::import::{ImportSettings, import};
+use crate::market::reconcile::{
+    Checked, Compared, Histories, Lives, Reconciliation, Replay, ReplayError, Showing, clock_difference, lives, reconcile,
+    reconcile_page, replay,
+};
+use crate::market::{MoneyError, PreparedRun, explained, prepare_run};
+use crate::sim2real::Seed;
+
+use super::paper_log::LogArguments;
+use super::screen::{Progress, Screen};
+use super::stop::{Outcome, Stop};
+
+/// Compare a backtest with a paper log, order by order: where they part, by how much, and why
+///
+/// Pairs up orders without shared ids, beside a difference of clocks. With --run, the paper log's own orders are sent through
+/// the backtest's simulator: what differs from the backtest then is decision (signal, data, sizing), and what differs from
+/// the log is execution (queue and fill, latency, spread, impact, fees). The causes sum to the gap of profit and loss to
+/// the last unit. With --tolerance it is a regression test: exit code 1 where the two part further.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  trueup reconcile --backtest out/run --paper logs/paper --run run.toml
+  trueup reconcile --backtest out/run --paper tradesv3.sqlite --tolerance unmatched=0 --tolerance mean_price_bps=1
+  trueup reconcile --backtest out/run --paper fills.csv --tolerance tolerance.toml --out out/reconcile")]
+pub(super) struct Reconcile {
+    /// Folder that `trueup backtest --out` wrote
+    #[arg(long, value_name = "DIR")]
+    backtest: PathBuf,
+    /// Files of the paper log, or a folder of which all files are read together
+    #[arg(long, value_name = "LOG", required = true, num_args = 1..)]
+    paper: Vec<PathBuf>,
+    #[command(flatten)]
+    log: LogArguments,
+    /// The run of the backtest: its simulator executes the paper log's orders, and its data say what the market showed
+    #[arg(long, value_name = "RUN.toml")]
+    run: Option<PathBuf>,
+    /// How far the two may part: KEY=VALUE, or a TOML file of keys and values [may be given several times]
+    #[arg(long, value_name = "FILE|KEY=VALUE")]
+    tolerance: Vec<String>,
+    /// Take the whole difference of stamps as one of clocks; of itself only one of whole zones is taken for that
+    #[arg(long)]
+    correct_clock: bool,
+    /// Folder to write reconcile.json, report.html and, with --tolerance, junit.xml into
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write over files that exist
+    #[arg(long)]
+    force: bool,
+    /// Print reconcile.json (schema trueup.reconcile/1) on standard output instead of tables
+    #[arg(long)]
+    json: bool,
+    /// Seed of the bootstrap
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+}
+
+/// The files that are written.
+const FILES: [&str; 3] = ["reconcile.json", "report.html", "junit.xml"];
+
+impl Reconcile {
+    pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
+        let tolerance = tolerances::read(&self.tolerance)?;
+        let settings = self.log.settings()?;
+        let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
+        if let Some(folder) = &self.out {
+            OutputFolder::create(folder, overwrite)?.check_free(&FILES)?;
+        }
+        let file = self.run.as_ref().map(RunFile::read).transpose()?;
+        let progress = screen.progress();
+        progress.tell("reading logs", 0, 0);
+        let backtest = backtest_log(&self.backtest)?;
+        let paper = lives(&import(&self.paper, &settings)?).map_err(|error| too_large(&self.paper[0], &error))?;
+        let found = self.found(&backtest, paper, file.as_ref(), &progress)?;
+        drop(progress);
+        let checked = found.checked(&tolerance);
+        self.tell(&found, &checked, overwrite, screen)?;
+        Ok(if checked.iter().all(|checked| checked.holds) { Outcome::Done } else { Outcome::Finding })
+    }
+
+    fn found(
+        &self,
+        backtest: &Lives,
+        mut paper: Lives,
+        file: Option<&RunFile>,
+        progress: &Progress,
+    ) -> Result<Reconciliation, Stop> {
+        let clock = clock_difference(&backtest.orders, &paper.orders);
+        if clock.is_a_zone || self.correct_clock {
+            let on = |order: crate::market::reconcile::Life| order.with_times(|at| clock.on_backtest(at));
+            paper.orders = paper.orders.into_iter().map(on).collect();
+            paper.notes.push(format!("its times are moved by {:+.6} s onto the backtest's clock", -clock.offset));
+        }
+        let fails = |error: MoneyError| Stop::from(too_large(&self.paper[0], &error));
+        let Some(file) = file else {
+            let compared = Compared { backtest, paper: &paper, replayed: None, showing: None, seed: Seed(self.seed) };
+            return reconcile(&compared).map_err(fails);
+        };
+        let prepared = prepare_run(file)?;
+        let symbols: Vec<&str> = prepared.backtest.instruments().iter().map(|i| i.symbol.as_str()).collect();
+        progress.tell("replaying", 0, 0);
+        let own = self.replayed(&prepared, file, &symbols, backtest)?;
+        let replayed = self.replayed(&prepared, file, &symbols, &paper)?;
+        paper.notes.extend(
+            replayed
+                .notes
+                .iter()
+                .map(|note| format!("{} orders were not replayed: {} (first: {})", note.orders, note.why, note.first)),
+        );
+        let mut backtest = backtest.clone();
+        backtest.notes.extend(own.differs_from(&backtest.orders));
+        let histories = Histories::new(&symbols, prepared.backtest.histories());
+        let showing: &dyn Showing = &histories;
+        let compared = Compared {
+            backtest: &backtest,
+            paper: &paper,
+            replayed: Some(&replayed.orders),
+            showing: Some(showing),
+            seed: Seed(self.seed),
+        };
+        reconcile(&compared).map_err(fails)
+    }
+
+    fn replayed(&self, prepared: &PreparedRun, file: &RunFile, symbols: &[&str], log: &Lives) -> Result<Replay, InputError> {
+        let session = prepared.start().map_err(|error| explained(file, &error))?;
+        replay(session, symbols, &log.orders).map_err(|error| match error {
+            ReplayError::Run(error) => explained(file, &error),
+            ReplayError::Money(error) => too_large(&self.paper[0], &error),
+        })
+    }
+
+    fn tell(&self, found: &Reconciliation, checked: &[Checked], overwrite: Overwrite, screen: &Screen) -> Result<(), Stop> {
+        let json = format!("{}\n", serde_json::to_string_pretty(found)?);
+        let mut text = if self.json { json.clone() } else { told::told(found, checked, screen) };
+        match &self.out {
+            Some(folder) => {
+                let [summary, page, junit] = FILES;
+                let mut output = OutputFolder::create(folder, overwrite)?;
+                output.file(summary, json.as_bytes())?;
+                output.file(page, reconcile_page(found, checked).render()?.as_bytes())?;
+                if !checked.is_empty() {
+                    output.file(junit, junit::junit(found, checked).as_bytes())?;
+                }
+                let paths = output.finish()?;
+                if !self.json {
+                    text += "\n";
+                    paths.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+                }
+            }
+            None if !self.json => text += "\nNothing was written; --out DIR writes a report.\n",
+            None => {}
+        }
+        screen.print(&text)
+    }
+}
+
+/// The orders of a backtest, as it wrote them.
+fn backtest_log(folder: &Path) -> Result<Lives, InputError> {
+    let table = |stem: &str| {
+        table_in(folder, stem)?.ok_or_else(|| {
+            InputError::new(folder, format!("there is no {stem} table in the folder"))
+                .hint("name the folder that `trueup backtest RUN.toml --out DIR` wrote")
+        })
+    };
+    let settings = ImportSettings { format: Some("trueup".to_owned()), ..ImportSettings::default() };
+    let log = import(&[table("orders")?, table("fills")?], &settings)?;
+    lives(&log).map_err(|error| too_large(folder, &error))
+}
+
+fn too_large(path: &Path, error: &MoneyError) -> InputError {
+    let text = error.to_string();
+    let (message, hint) = text.split_once("\nhint: ").unwrap_or((&text, ""));
+    InputError::new(path, message).hint(hint)
+}

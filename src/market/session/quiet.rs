@@ -1,0 +1,66 @@
+//! Quiet stretches: bars with nothing between them, while no order waits and nothing is on its way.
+//!
+//! Nearly all of a backtest on bars is that. Nothing happens there but that a bar becomes known and the strategy decides; so
+//! what [`Session::step`] looks for at each event is looked for once.
+
+use crate::market::{BacktestError, Strategy};
+use crate::sim2real::Timestamp;
+
+use super::Session;
+
+impl Session<'_> {
+    /// Lets at least one event happen and about `events` at most, as [`Session::step`] does one by one; whether there are more.
+    ///
+    /// # Errors
+    /// As [`Backtest::run`](crate::market::Backtest::run).
+    pub fn advance(&mut self, strategy: &mut dyn Strategy, events: usize) -> Result<bool, BacktestError> {
+        let last = self.held.events.saturating_add(events.max(1));
+        while self.held.events < last {
+            if self.can_be_quiet {
+                self.pass_quiet_bars(strategy, last)?;
+            }
+            if self.step(strategy)?.is_none() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Whether there is nothing in this run that wants to be looked for at every event: delays of data, hours of trading,
+    /// charges, and what happens to an account. Without bars in memory there is no such stretch.
+    pub(super) fn may_be_quiet(&self) -> bool {
+        self.feed.lines().iter().any(|line| line.all_bars().is_some_and(|bars| !bars.is_empty()))
+            && self.direct
+            && self.timetable.is_empty()
+            && self.keeping.is_none()
+            && self.venue.charges.is_empty()
+            && !self.clocks.watches()
+    }
+
+    /// Shows the strategy the bars of a quiet stretch, up to the first after which something is due.
+    #[inline]
+    fn pass_quiet_bars(&mut self, strategy: &mut dyn Strategy, last: usize) -> Result<(), BacktestError> {
+        let Some((instrument, bars, others)) = self.feed.bars_alone() else { return Ok(()) };
+        let floor = &self.venue.floors[instrument];
+        if !floor.is_idle() || !floor.is_quiet() {
+            return Ok(());
+        }
+        let due = self.agenda.peek().map_or(Timestamp::MAX, |(at, _)| at);
+        let shown = self.transit.peek().unwrap_or(Timestamp::MAX);
+        let (end, most) = (others.min(due).min(shown), last.saturating_sub(self.held.events));
+        let mut passed = 0;
+        let mut asked = Ok(false);
+        for bar in bars.iter().take(most).take_while(|bar| bar.known_at < end) {
+            passed += 1;
+            asked = self.show_bar(instrument, bar, strategy);
+            if !matches!(asked, Ok(false)) {
+                break;
+            }
+        }
+        if passed > 0 {
+            self.rows += passed;
+            self.feed.skip_bars(passed);
+        }
+        asked.map(|_| ())
+    }
+}
