@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use serde_json::Value;
 use tempfile::TempDir;
+use trueup::market::paper::import::FORMATS;
 
 /// A folder with a copy of a sample, and what the command did there: exit code, output, errors.
 struct Scene(TempDir);
@@ -75,6 +76,17 @@ fn tables_and_findings_are_written_once_and_read_again() {
     assert_eq!((code, &again["format"], &again["orders"], &again["fills"]), (0, &"trueup".into(), &2.into(), &3.into()));
     // A diagnosis reads them, and misses no column.
     assert_eq!(again["span"], findings["span"]);
+}
+
+#[test]
+fn every_format_is_named_by_the_help_and_described() {
+    let (_, help, _) = Scene::new(&[]).run("--help");
+    let words = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/paper_logs.md")).unwrap();
+    for format in FORMATS {
+        assert!(words.contains(format.id), "{}", format.id);
+        assert!(page.contains(&format!("### `{}`\n", format.id)), "{}", format.id);
+    }
 }
 
 #[test]

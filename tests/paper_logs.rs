@@ -189,6 +189,21 @@ fn hummingbots_millionths_and_sides_are_read() {
 }
 
 #[test]
+fn hummingbots_older_databases_hold_numbers_with_a_point() {
+    let older = HUMMINGBOT.replace("amount BIGINT", "amount FLOAT").replace("price BIGINT", "price FLOAT");
+    let older =
+        older.replace("500000, 1, 3900510000", "0.5, 1, 3900.51").replace("3900510000, 500000, 1", "3900.51, 0.5, 1");
+    let older =
+        older.replace("1000000, 1, 3899000000", "1.0, 1, 3899.0").replace("1000000, 1, 3898000000", "1.0, 1, 3898.0");
+    let [older, newer] = [&older, HUMMINGBOT].map(|script| {
+        let log = Written::database("strategy.sqlite", script).import(&ImportSettings::default()).unwrap();
+        let orders = log.orders.iter().map(|order| (order.quantity, order.limit_price)).collect::<Vec<_>>();
+        (orders, log.fills.iter().map(|fill| (fill.quantity, fill.price, fill.fee)).collect::<Vec<_>>())
+    });
+    assert_eq!(older, newer);
+}
+
+#[test]
 fn hummingbots_table_of_trades_dates_orders_by_their_age() {
     let log = read(&[sample("trades_pure_mm.csv")]);
     assert_eq!((log.format.as_str(), log.orders.len(), log.fills.len()), ("hummingbot", 2, 3));

@@ -57,39 +57,53 @@ pub fn read_sqlite(path: impl AsRef<Path>, wanted: &[&str]) -> Result<Database, 
 
 const NAME: &str = "copy";
 
+/// How often a copy is made anew because the database changed meanwhile.
+const TRIES: usize = 5;
+
 /// The database and what stands beside it in a folder of their own.
+///
+/// A copy that is made while pages go from the log into the database may have old and new ones: it counts only where neither
+/// file changed meanwhile.
 fn copied(path: &Path) -> Result<TempDir, InputError> {
     // It exists, and is no folder.
     drop(open(path)?);
-    let failed =
-        |from: &Path, error: &std::io::Error| InputError::new(from, format!("cannot be copied to be read ({error})"));
-    let folder = tempfile::tempdir().map_err(|error| failed(path, &error))?;
-    // The log first: what is moved from it into the database meanwhile is then in both copies, and not in neither.
-    for ending in BESIDE.into_iter().chain([""]) {
-        let mut from = path.as_os_str().to_owned();
-        from.push(ending);
-        let from = PathBuf::from(from);
-        if from.is_file() {
-            fs::copy(&from, folder.path().join(format!("{NAME}{ending}"))).map_err(|error| failed(&from, &error))?;
+    let failed = |error: &std::io::Error| InputError::new(path, format!("cannot be copied to be read ({error})"));
+    for _ in 0..TRIES {
+        let before = state(path);
+        let folder = tempfile::tempdir().map_err(|error| failed(&error))?;
+        for (from, ending) in parts(path).filter(|(from, _)| from.is_file()) {
+            copy_part(&from, &folder.path().join(format!("{NAME}{ending}"))).map_err(|error| failed(&error))?;
+        }
+        if state(path) == before {
+            return Ok(folder);
         }
     }
-    writable(&folder.path().join(NAME)).map_err(|error| failed(path, &error))?;
-    Ok(folder)
+    let error = InputError::new(path, "the database changes while it is copied to be read");
+    Err(error.hint("let the bot pause, or copy it with `sqlite3 FILE \".backup copy.sqlite\"` and read that"))
 }
 
-/// Lets the copy of a read-only file be written: a write-ahead log is read by taking it into the database.
-fn writable(copy: &Path) -> std::io::Result<()> {
-    for ending in BESIDE.into_iter().chain([""]) {
-        let mut file = copy.as_os_str().to_owned();
-        file.push(ending);
-        if let Ok(about) = fs::metadata(&file) {
-            let mut rights = about.permissions();
-            #[expect(clippy::permissions_set_readonly_false, reason = "the file is a copy in a folder of our own")]
-            rights.set_readonly(false);
-            fs::set_permissions(&file, rights)?;
-        }
-    }
-    Ok(())
+/// The database, and the files that may stand beside it: their paths, and what these end with.
+fn parts(path: &Path) -> impl Iterator<Item = (PathBuf, &'static str)> {
+    [""].into_iter().chain(BESIDE).map(|ending| {
+        let mut part = path.as_os_str().to_owned();
+        part.push(ending);
+        (PathBuf::from(part), ending)
+    })
+}
+
+/// Length of each part [bytes], and when it changed; none of one that is not there.
+fn state(path: &Path) -> impl PartialEq + use<> {
+    let part = |(part, _)| fs::metadata(part).ok().map(|about| (about.len(), about.modified().ok()));
+    parts(path).map(part).collect::<Vec<_>>()
+}
+
+/// Copies one of them. The copy of a read-only file may be written, for a log is read by taking it into the database.
+fn copy_part(part: &Path, copy: &Path) -> std::io::Result<()> {
+    fs::copy(part, copy)?;
+    let mut rights = fs::metadata(copy)?.permissions();
+    #[expect(clippy::permissions_set_readonly_false, reason = "the file is a copy in a folder of our own")]
+    rights.set_readonly(false);
+    fs::set_permissions(copy, rights)
 }
 
 fn names(database: &Connection) -> Result<Vec<String>, rusqlite::Error> {

@@ -126,6 +126,9 @@ fn findings(log: &PaperLog, screen: &Screen) -> String {
         for finding in summary.findings.iter().take(2) {
             text += &format!("{}\n", screen.wrapped("        - ", &finding.to_string()));
         }
+        if let Some(hint) = summary.hint {
+            text += &format!("{}\n", screen.wrapped("        hint: ", hint));
+        }
     }
     text
 }

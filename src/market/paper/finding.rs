@@ -138,6 +138,24 @@ impl FindingKind {
     }
 }
 
+impl FindingKind {
+    /// What to do about it; none where nothing can be done but to know it.
+    #[must_use]
+    pub fn hint(self) -> Option<&'static str> {
+        Some(match self {
+            Self::UnreadRow => "mend these rows and import again; findings.json has all of them",
+            Self::FeeInOtherCurrency => "say what they are worth with --fee-rate, such as BNB/USDT=612.5",
+            Self::FillWithoutOrder => "give the log of orders too, or a longer span of it",
+            Self::OrderWithoutFill | Self::FilledOtherwise => "give the log of fills too, or a longer span of it",
+            Self::TotalsOnly => "give the log of executions too, where there is one",
+            Self::ConflictingFill | Self::RestatedOrder => "are the files of several runs or accounts given together?",
+            Self::BrokenChain => "give a longer span of the log",
+            Self::Unmapped => "add them to the file of --symbols, if they are to have other names",
+            _ => return None,
+        })
+    }
+}
+
 /// One of them, with its place.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct PaperFinding {
@@ -198,6 +216,9 @@ pub struct FindingSummary {
     pub says: &'static str,
     /// How many.
     pub count: usize,
+    /// What to do about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hint: Option<&'static str>,
     /// The first of them; of rows that could not be read all.
     pub findings: Vec<PaperFinding>,
 }
@@ -246,6 +267,7 @@ impl PaperFindings {
             kind: *kind,
             says: kind.words(),
             count: *count,
+            hint: kind.hint(),
             findings: findings.clone(),
         };
         self.kinds.iter().map(summary).collect()
