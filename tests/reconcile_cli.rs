@@ -170,3 +170,39 @@ fn latency_and_slippage_of_another_engine_are_found() {
     assert!((-0.8..-0.1).contains(&amount("impact")), "{}", amount("impact"));
     assert!(amount("spread").abs() < 0.1 && amount("signal") == 0.0 && amount("sizing") == 0.0);
 }
+
+/// The loop closes: on orders that no diagnosis has seen, what the backtest left out of an exchange of agents with 250 ms of
+/// latency makes a gap; with the mechanisms that diagnosis names there (tests/real_recordings.rs) the simulator makes of every order
+/// what the exchange made of it.
+#[test]
+fn with_what_was_left_out_the_gap_of_held_out_orders_closes() {
+    let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/market/abides/02_market_lat250ms_q50");
+    if !log.exists() {
+        println!("skipped: there is no {}", log.display());
+        return;
+    }
+    let scene = Scene(tempfile::tempdir().unwrap());
+    let run = format!(
+        // The last 30 % in time of the log.
+        "[run]\nseed = 1\ncash = 1_000_000_000\ncurrency = \"USD\"\nmax_leverage = 100.0\nstart = \"2021-02-05T10:55:20Z\"\n\n\
+         [[instrument]]\nsymbol = \"ABM\"\ntick_size = 0.01\nlot_size = 1\n\n\
+         [[data]]\nsymbol = \"ABM\"\nquotes = \"{}\"\n\n[strategy]\nkind = \"buy_and_hold\"\n",
+        log.join("quotes.parquet").display()
+    );
+    let found = "\n[[mechanism]]\nname = \"half_spread\"\nfraction = 1.0\n\n[[mechanism]]\nname = \"book_walk\"\nfraction = 1.0\n\n\
+                 [[mechanism]]\nname = \"command_delay\"\nseconds = 0.25\n";
+    std::fs::write(scene.path("before.toml"), &run).unwrap();
+    std::fs::write(scene.path("after.toml"), run + found).unwrap();
+    let [orders, fills] = ["orders.csv", "fills.csv"].map(|name| log.join(name).to_str().unwrap().to_owned());
+    let gap = |run: &str| {
+        let output = scene.call(&["reconcile", "--run", run, "--paper", &orders, &fills, "--json"]);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let differ = found["orders"].as_array().unwrap().iter().filter(|order| order["price_bps"] != 0.0).count();
+        (found["counts"]["pairs"].as_u64().unwrap(), differ, found["gaps"][0]["gap"].as_f64().unwrap())
+    };
+    let (before, after) = (gap("before.toml"), gap("after.toml"));
+    println!("orders, of these at another price, gap: {before:?} before, {after:?} after");
+    assert!(before.0 > 150 && before.1 > 30 && before.2.abs() > 10.0, "{before:?}");
+    assert_eq!((after.0, after.1, after.2), (before.0, 0, 0.0));
+}

@@ -112,7 +112,7 @@ impl Reconcile {
         let symbols: Vec<&str> = prepared.backtest.instruments().iter().map(|i| i.symbol.as_str()).collect();
         check_symbols(file, &symbols, &paper)?;
         progress.tell("replaying", 0, 0);
-        let replayed = self.replayed(&prepared, file, &symbols, &paper)?;
+        let mut replayed = self.replayed(&prepared, file, &symbols, &paper)?;
         let note =
             |note: &ReplayNote| format!("{} orders were not replayed: {} (first: {})", note.orders, note.why, note.first);
         paper.notes.extend(replayed.notes.iter().map(note));
@@ -122,7 +122,13 @@ impl Reconcile {
                 backtest.notes.extend(own.differs_from(&backtest.orders));
                 backtest
             }
-            None => Lives { orders: replayed.orders.iter().flatten().cloned().collect(), notes: Vec::new() },
+            // Execution alone: of what was not replayed there is nothing to compare.
+            None => {
+                let (orders, executed) =
+                    paper.orders.into_iter().zip(replayed.orders).filter(|(_, own)| own.is_some()).unzip();
+                (paper.orders, replayed.orders) = (orders, executed);
+                Lives { orders: replayed.orders.iter().flatten().cloned().collect(), notes: Vec::new() }
+            }
         };
         let histories = Histories::new(&symbols, prepared.backtest.histories());
         let (showing, executed) = (Some(&histories as &dyn Showing), Some(replayed.orders.as_slice()));

@@ -132,6 +132,10 @@ pub(super) fn of_execution(
     };
     split.add(Cause::QueueFill, parts.sizing.plus(parts.filled)?)?;
     split.add(Cause::Fees, parts.fees)?;
+    // At the same price nothing made a difference, whatever the stamps say of when it was.
+    if parts.price == Cash::ZERO {
+        return Ok(());
+    }
     if before.rests() || after.rests() {
         return split.add(Cause::QueueFill, parts.price);
     }

@@ -114,7 +114,7 @@ pub fn replay(mut session: Session<'_>, symbols: &[&str], orders: &[Life]) -> Re
 /// What the simulator is asked for, or why it cannot be asked.
 fn ticket(order: &Life, symbols: &[&str]) -> Result<Ticket, String> {
     let instrument = symbols.iter().position(|symbol| *symbol == order.symbol);
-    let instrument = instrument.ok_or_else(|| format!("the run has no instrument {}", order.symbol))?;
+    let instrument = instrument.ok_or("the run has no such instrument")?;
     let quantity = order.ordered.filter(|quantity| *quantity > Quantity::ZERO).ok_or("no quantity is known")?;
     let limit = || order.limit.ok_or("no limit is known");
     let trigger = || order.stop.ok_or("no stop price is known");
@@ -147,6 +147,7 @@ struct Replayer {
     /// Time, place in the log, what is asked for, and when it is taken back.
     due: Vec<(Timestamp, usize, Ticket, Option<Timestamp>)>,
     next: usize,
+    under_way: bool,
     sent: HashMap<OrderId, usize>,
     withdrawals: BTreeMap<(Timestamp, OrderId), ()>,
     woken_at: Option<Timestamp>,
@@ -165,6 +166,10 @@ impl Strategy for Replayer {
 
     fn on_event(&mut self, view: &View<'_>, orders: &mut Orders) {
         let now = view.event().time;
+        // What was decided before there were any data is not decided on the first of them.
+        if !std::mem::replace(&mut self.under_way, true) {
+            self.next = self.due.partition_point(|due| due.0 < now);
+        }
         while let Some((_, place, ticket, withdrawn_at)) = self.due.get(self.next).filter(|due| due.0 <= now).copied() {
             let id = orders.submit(ticket);
             self.sent.insert(id, place);
