@@ -4,6 +4,7 @@ mod junit;
 mod told;
 mod tolerances;
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -11,10 +12,10 @@ use clap::Args;
 use crate::io::{InputError, OutputFolder, Overwrite, RunFile, listed, table_in};
 use crate::market::paper::import::{ImportSettings, import};
 use crate::market::reconcile::{
-    Checked, Compared, Histories, Lives, Reconciliation, Replay, ReplayError, ReplayNote, Showing, clock_difference, lives,
-    reconcile, reconcile_page, replay,
+    Checked, Compared, Histories, Life, Lives, Reconciliation, Replay, ReplayError, ReplayNote, Showing, clock_difference,
+    lives, reconcile, reconcile_page, replay,
 };
-use crate::market::{MoneyError, PreparedRun, explained, prepare_run};
+use crate::market::{MoneyError, Multiplier, PreparedRun, explained, prepare_run};
 use crate::sim2real::Seed;
 
 use super::paper_log::LogArguments;
@@ -111,6 +112,9 @@ impl Reconcile {
         let prepared = prepare_run(file)?;
         let symbols: Vec<&str> = prepared.backtest.instruments().iter().map(|i| i.symbol.as_str()).collect();
         check_symbols(file, &symbols, &paper)?;
+        let multipliers = multipliers(&prepared, &symbols);
+        let known = |life: &mut Life| life.multiplier = multipliers.get(life.symbol.as_str()).copied().unwrap_or_default();
+        paper.orders.iter_mut().for_each(known);
         progress.tell("replaying", 0, 0);
         let mut replayed = self.replayed(&prepared, file, &symbols, &paper)?;
         let note =
@@ -118,6 +122,7 @@ impl Reconcile {
         paper.notes.extend(replayed.notes.iter().map(note));
         let backtest = match backtest {
             Some(mut backtest) => {
+                backtest.orders.iter_mut().for_each(known);
                 let own = self.replayed(&prepared, file, &symbols, &backtest)?;
                 backtest.notes.extend(own.differs_from(&backtest.orders));
                 backtest
@@ -167,6 +172,12 @@ impl Reconcile {
         }
         screen.print(&text)
     }
+}
+
+/// What one unit of each symbol is of its underlying.
+fn multipliers<'a>(prepared: &PreparedRun, symbols: &[&'a str]) -> HashMap<&'a str, Multiplier> {
+    let terms = prepared.backtest.settings().account.iter().flat_map(|account| &account.terms);
+    symbols.iter().copied().zip(terms.map(|terms| terms.multiplier)).collect()
 }
 
 /// Refuses a run that has nothing of what the log traded.

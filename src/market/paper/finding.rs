@@ -99,6 +99,15 @@ pub enum FindingKind {
 }
 
 impl FindingKind {
+    /// Whether who compares the log with anything has to know it: what is missing, made up, or stamped by another clock than it seems.
+    #[must_use]
+    pub fn bears_on_comparison(self) -> bool {
+        !matches!(
+            self,
+            Self::PassedOver | Self::RoundedNumber | Self::Duplicate | Self::Replaced | Self::Note | Self::Unmapped
+        )
+    }
+
     /// What it says of the log, as a sentence without its full stop.
     #[must_use]
     pub fn words(self) -> &'static str {

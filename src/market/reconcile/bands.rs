@@ -67,7 +67,12 @@ pub(super) fn bands(paper: &[Life], showing: &dyn Showing, mark: impl Fn(&Life) 
             };
             bands.executions += 1;
             let (best, worst) = if life.side == Side::Buy { (low, high) } else { (high, low) };
-            let gain = |price: Price| life.side.sign() * piece.quantity.to_f64() * (mark(life).to_f64() - price.to_f64());
+            let gain = |price: Price| {
+                life.side.sign()
+                    * piece.quantity.to_f64()
+                    * life.multiplier.get() as f64
+                    * (mark(life).to_f64() - price.to_f64())
+            };
             bands.pessimistic += gain(worst);
             bands.paper += gain(piece.price);
             bands.optimistic += gain(best);

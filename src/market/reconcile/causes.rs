@@ -142,7 +142,7 @@ pub(super) fn of_execution(
     let (Some(was), Some(is)) = (Course::of(before, showing), Course::of(after, showing)) else {
         return split.add(Cause::Price, parts.price);
     };
-    let units = after.filled.to_f64();
+    let units = after.underlying();
     let latency = Cash::nearest(units * (was.moved - is.moved))?;
     let spread = Cash::nearest(units * (was.spread - is.spread))?;
     split.add(Cause::Latency, latency)?;
@@ -175,7 +175,7 @@ pub(super) fn of_both(
         let resting = before.rests() || after.rests();
         if let (Some(was), Some(is), false) = (mids(before), mids(after), resting) {
             // The order was decided where the mid was another; what followed counts from there.
-            let moved = after.side.sign() * (was - is) * after.filled.to_f64();
+            let moved = after.side.sign() * (was - is) * after.underlying();
             let data = Cash::nearest(moved)?;
             let from = if own.of(Cause::Price) == Cash::ZERO { Cause::Impact } else { Cause::Price };
             own.add(Cause::Data, data)?;

@@ -62,8 +62,8 @@ impl OrderDifference {
         let delay = |life: &Life| Some(life.first()?.seconds_since(life.at));
         own.delay_seconds = delay(before).zip(delay(after)).map(|(was, is)| is - was);
         let rate = |life: &Life| {
-            let notional = life.notional.to_f64().abs();
-            (notional > 0.0).then(|| 1e4 * life.fees.to_f64() / notional)
+            let turnover = life.turnover();
+            (turnover > 0.0).then(|| 1e4 * life.fees.to_f64() / turnover)
         };
         own.fee_bps = rate(before).zip(rate(after)).map(|(was, is)| is - was);
         Ok(own)
@@ -93,7 +93,7 @@ impl OrderDifference {
             price_bps: None,
             delay_seconds: None,
             fee_bps: None,
-            traded: after.or(before).map_or(0.0, |life| life.notional.to_f64().abs()),
+            traded: after.or(before).map_or(0.0, Life::turnover),
             gap: split.total()?.to_f64(),
             causes: amounts.filter(|(_, amount)| *amount != 0.0).collect(),
         })

@@ -59,7 +59,7 @@ pub(super) fn worth_by_currency(lives: &[Life], mark: impl Fn(&Life) -> Price) -
     for life in lives {
         let own = worth.entry(life.currency.clone()).or_default();
         own.0 = own.0.plus(life.worth(mark(life))?)?;
-        own.1 += life.notional.to_f64().abs();
+        own.1 += life.turnover();
     }
     Ok(worth)
 }

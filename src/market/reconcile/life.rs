@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::market::paper::{OrderWords, PaperFill, PaperLog, PaperOrder, PaperStatus};
-use crate::market::{Cash, MoneyError, Price, Quantity, Side};
+use crate::market::{Cash, MoneyError, Multiplier, Price, Quantity, Side};
 use crate::sim2real::Timestamp;
 
 /// One execution.
@@ -42,9 +42,11 @@ pub struct Life {
     pub time_in_force: Option<String>,
     /// When it was taken back, or its time was over.
     pub withdrawn_at: Option<Timestamp>,
+    /// Units of the underlying in one unit traded: prices are of one of these.
+    pub multiplier: Multiplier,
     /// What was filled [units].
     pub filled: Quantity,
-    /// What that came to at its prices [currency].
+    /// What that came to at its prices, for a multiplier of 1 [currency].
     pub notional: Cash,
     /// Fees [currency].
     pub fees: Cash,
@@ -59,6 +61,7 @@ impl Life {
     /// If 128 bits do not hold it.
     pub fn worth(&self, mark: Price) -> Result<Cash, MoneyError> {
         let gain = (mark * self.filled).minus(self.notional)?;
+        let gain = gain.0.checked_mul(self.multiplier.get().into()).map(Cash).ok_or(MoneyError::Overflow)?;
         let gain = if self.side == Side::Buy { gain } else { Cash::ZERO.minus(gain)? };
         gain.minus(self.fees)
     }
@@ -67,6 +70,18 @@ impl Life {
     #[must_use]
     pub fn average(&self) -> Option<f64> {
         (self.filled > Quantity::ZERO).then(|| self.notional.to_f64() / self.filled.to_f64())
+    }
+
+    /// Units of the underlying that were filled.
+    #[must_use]
+    pub fn underlying(&self) -> f64 {
+        self.filled.to_f64() * self.multiplier.get() as f64
+    }
+
+    /// What changed hands [currency].
+    #[must_use]
+    pub fn turnover(&self) -> f64 {
+        self.notional.to_f64().abs() * self.multiplier.get() as f64
     }
 
     /// The first execution.
@@ -95,6 +110,7 @@ impl Life {
             stop: order.stop_price,
             time_in_force: order.time_in_force.clone(),
             withdrawn_at: order.ended_at.filter(|_| withdrawn),
+            multiplier: Multiplier::default(),
             filled: Quantity::ZERO,
             notional: Cash::ZERO,
             fees: Cash::ZERO,
@@ -188,6 +204,10 @@ pub fn lives(log: &PaperLog) -> Result<Lives, MoneyError> {
     note(alone, "fills whose order is not in the log count as orders of their own");
     note(sideless, "fills of which neither side nor order is known are left out");
     note(feeless, "fills have no fee in the currency of their price, and count as free");
+    notes.extend(log.findings.summaries().into_iter().filter(|found| found.kind.bears_on_comparison()).map(|found| {
+        let first = found.findings.first().map_or_else(String::new, |first| format!(" (first: {first})"));
+        format!("{} x {}{first}", found.count, found.says)
+    }));
     Ok(Lives { orders, notes })
 }
 
@@ -204,6 +224,7 @@ fn alone_of(fill: &PaperFill, id: String, side: Side) -> Life {
         stop: None,
         time_in_force: None,
         withdrawn_at: None,
+        multiplier: Multiplier::default(),
         filled: Quantity::ZERO,
         notional: Cash::ZERO,
         fees: Cash::ZERO,

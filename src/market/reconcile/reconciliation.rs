@@ -169,7 +169,9 @@ pub fn reconcile(compared: &Compared<'_>) -> Result<Reconciliation, MoneyError> 
         }
         accounted.push((OrderDifference::of_one(None, Some(life), &clock, &split)?, split));
     }
-    accounted.sort_by(|a, b| (a.0.at, &a.0.symbol, a.0.name()).cmp(&(b.0.at, &b.0.symbol, b.0.name())));
+    accounted.sort_by(|(a, _), (b, _)| {
+        a.at.cmp(&b.at).then_with(|| a.symbol.cmp(&b.symbol)).then_with(|| a.name().cmp(&b.name()))
+    });
 
     let counts = ReconcileCounts {
         backtest: backtest.len(),
