@@ -45,5 +45,7 @@ pub fn same_every_way(backtest: &Backtest, record: &Record, strategy: &(impl Str
 
     let (mut session, mut own) = (backtest.start(), strategy.clone());
     while session.advance(&mut own, 3).unwrap() {}
+    let (rows, of) = session.progress();
+    assert_eq!(Some(rows), of, "every row is counted");
     assert_eq!(session.finish().unwrap(), *record, "a few events at a time");
 }
