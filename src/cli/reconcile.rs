@@ -150,13 +150,13 @@ impl Reconcile {
     }
 
     fn tell(&self, found: &Reconciliation, checked: &[Checked], overwrite: Overwrite, screen: &Screen) -> Result<(), Stop> {
-        let json = format!("{}\n", serde_json::to_string_pretty(found)?);
-        let mut text = if self.json { json.clone() } else { told::told(found, checked, screen) };
+        let json = || Ok::<_, Stop>(format!("{}\n", serde_json::to_string_pretty(found)?));
+        let mut text = if self.json { json()? } else { told::told(found, checked, screen) };
         match &self.out {
             Some(folder) => {
                 let [summary, page, junit] = FILES;
                 let mut output = OutputFolder::create(folder, overwrite)?;
-                output.file(summary, json.as_bytes())?;
+                output.file(summary, json()?.as_bytes())?;
                 output.file(page, reconcile_page(found, checked).render()?.as_bytes())?;
                 if !checked.is_empty() {
                     output.file(junit, junit::junit(found, checked).as_bytes())?;

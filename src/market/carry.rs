@@ -14,7 +14,7 @@ const DAY: i64 = 86_400 * Timestamp::NANOS;
 pub(super) struct Carry {
     since: Vec<Timestamp>,
     /// When all are charged next.
-    next: Timestamp,
+    pub next: Timestamp,
 }
 
 impl Carry {

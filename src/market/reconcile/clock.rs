@@ -50,7 +50,7 @@ const NEAR: [f64; 4] = [60.0, 10.0, 2.0, 0.5];
 /// Widths of the bins in which differences of stamps are counted [s].
 const BINS: [f64; 3] = [0.25, 2.0, 20.0];
 /// Orders an offset is estimated from at most.
-const SAMPLE: usize = 2_000;
+const SAMPLE: usize = 1_000;
 /// The fewest pairs that tell of a drift.
 const FEWEST: usize = 20;
 /// How many standard deviations more slopes are of one sign than chance would have it.
@@ -62,14 +62,14 @@ pub fn clock_difference(backtest: &[Life], paper: &[Life]) -> ClockDifference {
     let Some(origin) = backtest.first().map(|order| order.at) else { return ClockDifference::none(Timestamp::default()) };
     let stamps = Stamps::of(paper, origin);
     let every = backtest.len().div_ceil(SAMPLE).max(1);
-    let sample: Vec<(&Life, f64)> =
-        backtest.iter().step_by(every).map(|order| (order, order.at.seconds_since(origin))).collect();
+    let sampled = |order| Sampled { order, at: order.at.seconds_since(origin), like: stamps.like(order) };
+    let sample: Vec<Sampled<'_>> = backtest.iter().step_by(every).map(sampled).collect();
     let gaps = |offset: f64, near: f64| -> Vec<(f64, f64)> {
-        sample.iter().filter_map(|(order, at)| Some((*at, stamps.gap(order, at + offset, near)?))).collect()
+        sample.iter().filter_map(|own| Some((own.at, own.gap(offset, near)?))).collect()
     };
     let zones = (-QUARTERS..=QUARTERS).map(|k| k as f64 * QUARTER);
-    let tried = zones.chain(BINS.into_iter().filter_map(|width| stamps.commonest(&sample, width)));
-    let rate = |near: f64| sample.iter().map(|(order, _)| stamps.by_chance(order, near)).sum::<f64>();
+    let tried = zones.chain(BINS.into_iter().filter_map(|width| commonest(&sample, width)));
+    let rate = |near: f64| sample.iter().map(|own| own.by_chance(near)).sum::<f64>();
     let by_chance = NEAR.map(rate);
     // By how many standard deviations more orders lie that near than chance would have it.
     let sure = |offset: f64, level: usize| {
@@ -153,35 +153,46 @@ impl<'a> Stamps<'a> {
     fn like<'b>(&'b self, order: &'b Life) -> &'b [Stamp] {
         self.of.get(&(order.symbol.as_str(), order.side)).map_or(&[], Vec::as_slice)
     }
+}
 
-    /// How much later than `at` the nearest order like this one is [s], where that is no more than `near`.
-    fn gap(&self, order: &Life, at: f64, near: f64) -> Option<f64> {
-        let like = self.like(order);
-        let behind = like.partition_point(|(stamp, _)| *stamp < at);
-        let gaps = [behind.checked_sub(1), Some(behind)].into_iter().flatten().filter_map(|k| Some(like.get(k)?.0 - at));
+/// An order of the backtest, and the stamps of those like it in the paper log.
+struct Sampled<'a> {
+    order: &'a Life,
+    /// When it was decided [s].
+    at: f64,
+    like: &'a [Stamp],
+}
+
+impl Sampled<'_> {
+    /// How much later than its own time and `offset` the nearest order like it is [s], where that is no more than `near`.
+    fn gap(&self, offset: f64, near: f64) -> Option<f64> {
+        let at = self.at + offset;
+        let behind = self.like.partition_point(|(stamp, _)| *stamp < at);
+        let around = [behind.checked_sub(1), Some(behind)].into_iter().flatten();
+        let gaps = around.filter_map(|k| Some(self.like.get(k)?.0 - at));
         gaps.min_by(|a, b| a.abs().total_cmp(&b.abs())).filter(|gap| gap.abs() <= near)
     }
 
-    /// How likely it is that an order like this one lies within `near` [s] of a time by chance.
-    fn by_chance(&self, order: &Life, near: f64) -> f64 {
-        let like = self.like(order);
-        let (Some(first), Some(last)) = (like.first(), like.last()) else { return 0.0 };
-        1.0 - (-2.0 * near * like.len() as f64 / (last.0 - first.0).max(2.0 * near)).exp()
+    /// How likely it is that an order like it lies within `near` [s] of a time by chance.
+    fn by_chance(&self, near: f64) -> f64 {
+        let (Some(first), Some(last)) = (self.like.first(), self.like.last()) else { return 0.0 };
+        1.0 - (-2.0 * near * self.like.len() as f64 / (last.0 - first.0).max(2.0 * near)).exp()
     }
+}
 
-    /// By how much orders of the same size lie apart most often, within an hour [s], in bins of `width` [s].
-    fn commonest(&self, sample: &[(&Life, f64)], width: f64) -> Option<f64> {
-        const REACH: f64 = 3_600.0;
-        const MOST: usize = 400;
-        let mut votes: BTreeMap<i64, usize> = BTreeMap::new();
-        for (order, at) in sample.iter().step_by(sample.len().div_ceil(MOST).max(1)) {
-            let like = self.like(order);
-            let from = like.partition_point(|(stamp, _)| *stamp < at - REACH);
-            let near = like[from..].iter().take_while(|(stamp, _)| *stamp <= at + REACH).take(MOST);
-            for (stamp, _) in near.filter(|(_, quantity)| *quantity == order.ordered) {
-                *votes.entry(((stamp - at) / width).round() as i64).or_default() += 1;
-            }
+/// By how much orders of the same size lie apart most often, within an hour [s], in bins of `width` [s].
+fn commonest(sample: &[Sampled<'_>], width: f64) -> Option<f64> {
+    const REACH: f64 = 3_600.0;
+    const MOST: usize = 400;
+    let mut votes: BTreeMap<i64, usize> = BTreeMap::new();
+    for Sampled { order, at, like } in sample.iter().step_by(sample.len().div_ceil(MOST).max(1)) {
+        // Of many the nearest.
+        let middle = like.partition_point(|(stamp, _)| stamp < at);
+        let around = &like[middle.saturating_sub(MOST)..like.len().min(middle + MOST)];
+        let near = around.iter().filter(|(stamp, quantity)| (stamp - at).abs() <= REACH && *quantity == order.ordered);
+        for (stamp, _) in near {
+            *votes.entry(((stamp - at) / width).round() as i64).or_default() += 1;
         }
-        votes.into_iter().max_by_key(|(bin, count)| (*count, -bin.abs())).map(|(bin, _)| bin as f64 * width)
     }
+    votes.into_iter().max_by_key(|(bin, count)| (*count, -bin.abs())).map(|(bin, _)| bin as f64 * width)
 }

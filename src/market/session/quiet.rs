@@ -26,14 +26,13 @@ impl Session<'_> {
         Ok(true)
     }
 
-    /// Whether there is nothing in this run that wants to be looked for at every event: delays of data, hours of trading,
-    /// charges, and what happens to an account. Without bars in memory there is no such stretch.
+    /// Whether there is nothing in this run that wants to be looked for at every event: delays of data, hours of trading, and
+    /// what happens to an account. Without bars in memory there is no such stretch.
     pub(super) fn may_be_quiet(&self) -> bool {
         self.feed.lines().iter().any(|line| line.all_bars().is_some_and(|bars| !bars.is_empty()))
             && self.direct
             && self.timetable.is_empty()
             && self.keeping.is_none()
-            && self.venue.charges.is_empty()
             && !self.clocks.watches()
     }
 
@@ -47,7 +46,9 @@ impl Session<'_> {
         }
         let due = self.agenda.peek().map_or(Timestamp::MAX, |(at, _)| at);
         let shown = self.transit.peek().unwrap_or(Timestamp::MAX);
-        let (end, most) = (others.min(due).min(shown), last.saturating_sub(self.held.events));
+        // What is held is charged at the first event of a day.
+        let day = if self.venue.charges.is_empty() { Timestamp::MAX } else { self.carry.next };
+        let (end, most) = (others.min(due).min(shown).min(day), last.saturating_sub(self.held.events));
         let mut passed = 0;
         let mut asked = Ok(false);
         for bar in bars.iter().take(most).take_while(|bar| bar.known_at < end) {
