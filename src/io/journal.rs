@@ -60,13 +60,12 @@ impl Journal {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder).map_err(|error| unwritten(path, &error))?;
         }
-        let file = OpenOptions::new().read(true).append(true).create_new(true).open(path).map_err(|error| {
-            match error.kind() {
+        let file =
+            OpenOptions::new().read(true).append(true).create_new(true).open(path).map_err(|error| match error.kind() {
                 std::io::ErrorKind::AlreadyExists => InputError::new(path, "there is a journal already")
                     .hint("go on with it by --resume, or name another folder with --out"),
                 _ => unwritten(path, &error),
-            }
-        })?;
+            })?;
         lock(path, &file)?;
         Ok(Self { path: path.to_path_buf(), file, sync, unsynced: false })
     }

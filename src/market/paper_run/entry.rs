@@ -163,7 +163,8 @@ impl Told {
             return Vec::new();
         }
         let symbol = |k: usize| instruments.get(k).map_or_else(|| k.to_string(), |instrument| instrument.symbol.clone());
-        let sent = blotter.orders.iter().skip(orders).map(|order| Entry::Order(of_order(order, symbol(order.instrument), event)));
+        let sent =
+            blotter.orders.iter().skip(orders).map(|order| Entry::Order(of_order(order, symbol(order.instrument), event)));
         let refused = blotter.rejections.iter().skip(refusals);
         let refused = refused.map(|refusal| Entry::Refusal(of_refusal(refusal, symbol(refusal.instrument), event)));
         let filled = blotter.fills.iter().skip(fills).map(|fill| Entry::Fill(of_fill(fill, symbol(fill.instrument), event)));

@@ -126,7 +126,8 @@ impl PaperLog {
     /// Whether there is anything in it that has yet to be asked for, or done again.
     pub fn is_replaying(&mut self) -> Result<bool, InputError> {
         loop {
-            let waiting = !self.expected.is_empty() || !self.texts.is_empty() || self.rows.iter().any(|rows| !rows.is_empty());
+            let waiting =
+                !self.expected.is_empty() || !self.texts.is_empty() || self.rows.iter().any(|rows| !rows.is_empty());
             if waiting {
                 return Ok(true);
             }
