@@ -12,14 +12,25 @@ use super::paper_log::PaperLog;
 
 /// What gives the lines of a feed. It waits until there is one.
 pub trait LineSource: Send {
-    /// The next line; none when there are no more, or nobody wants them any more.
+    /// The next line. It waits a while for one, and says so where there is none by then.
     ///
     /// # Errors
     /// A feed that cannot be read.
-    fn next_line(&mut self) -> Result<Option<String>, InputError>;
+    fn next_line(&mut self) -> Result<NextLine, InputError>;
 
     /// A row that cannot be was left out.
     fn refused(&mut self, why: &InputError);
+}
+
+/// What comes next in a feed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum NextLine {
+    /// A line.
+    Text(String),
+    /// Nothing yet.
+    Later,
+    /// There are no more, or nobody wants them any more.
+    End,
 }
 
 /// What is done about rows of a feed that cannot be.
@@ -115,7 +126,7 @@ impl Lines {
         }
     }
 
-    /// Reads a line, and puts its row where it belongs; false at the end.
+    /// Reads a line if there is one, and puts its row where it belongs; false at the end.
     fn read_on(&mut self) -> Result<bool, InputError> {
         let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
         let (line, text, fresh) = match log.next_text()? {
@@ -125,12 +136,16 @@ impl Lines {
                 return Ok(false);
             }
             None => match self.source.next_line()? {
-                Some(text) => {
+                NextLine::Text(text) => {
                     let line = self.line + 1;
                     log.add(&[Entry::Line { line, text: text.clone() }])?;
                     (line, text, true)
                 }
-                None => {
+                NextLine::Later => {
+                    log.sync()?;
+                    return Ok(true);
+                }
+                NextLine::End => {
                     log.add(&[Entry::EndOfInput {}])?;
                     self.ended = true;
                     return Ok(false);

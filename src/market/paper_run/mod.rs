@@ -15,7 +15,7 @@ mod trading;
 
 pub use entry::{FeedFrom, Stop, StopReason};
 pub use limits::{Loss, OnLoss, PaperSettings};
-pub use line_feed::{BadRows, LineSource, LinesSeen};
+pub use line_feed::{BadRows, LineSource, LinesSeen, NextLine};
 pub use paper_log::Replayed;
 pub use prepare::{JournalUse, Opened, PaperFeed, PreparedPaper};
 pub use trading::{PaperSession, PaperStatus};

@@ -113,6 +113,17 @@ impl PreparedPaper {
         Ok((Self { run, prepared, settings, log, lines }, Opened { cut }))
     }
 
+    /// The run.
+    #[must_use]
+    pub fn run(&self) -> &RunFile {
+        &self.run
+    }
+
+    /// The symbols of its instruments.
+    pub fn symbols(&self) -> impl Iterator<Item = &str> {
+        self.run.instruments.iter().map(|instrument| instrument.symbol.as_str())
+    }
+
     /// What holds it within bounds.
     #[must_use]
     pub fn settings(&self) -> &PaperSettings {
