@@ -102,7 +102,9 @@ const SERVO: &str = "diagnose twin.toml --recording train.csv --holdout test.csv
 #[test]
 fn every_command_explains_itself() {
     let scene = Scene::new();
-    for command in ["", "demo", "diagnose", "calibrate", "backtest", "paper", "mechanisms", "data", "data make", "data import"] {
+    for command in
+        ["", "demo", "diagnose", "calibrate", "backtest", "paper", "mechanisms", "data", "data make", "data import"]
+    {
         let ran = scene.run(&format!("{command} --help"));
         assert_eq!((ran.code, ran.err.as_str()), (0, ""), "{command}");
         let name = if command.is_empty() { "trueup".to_owned() } else { command.replace(' ', "_") };

@@ -161,7 +161,8 @@ fn killed_over_and_over(folder: &Folder, out: &str, arguments: &str, feed: Optio
                 }
             }
         });
-        let life = Duration::from_millis(20 + walk.next(260));
+        // Longer each time: what was done before is done again first, and takes as long as the machine lets it.
+        let life = Duration::from_millis(20 + walk.next(200) + 15 * kills as u64);
         let until = Instant::now() + life;
         let ended = loop {
             if let Some(status) = child.try_wait().unwrap() {
@@ -256,7 +257,8 @@ fn rows_that_cannot_be_are_told_with_line_key_and_value_and_left_out() {
         format!("{{{at}{sizes}"),
         "{\"symbol\": \"AA\", \"kind\": \"quote\", \"ts\": 1}".to_owned(),
         "{\"symbol\": \"A\", \"kind\": \"trade\", \"ts\": 1}".to_owned(),
-        "{\"symbol\": \"A\", \"kind\": \"quote\", \"ts\": 1, \"bid\": 1, \"bid_size\": 1, \"ask\": 2, \"ask_size\": 1}".to_owned(),
+        "{\"symbol\": \"A\", \"kind\": \"quote\", \"ts\": 1, \"bid\": 1, \"bid_size\": 1, \"ask\": 2, \"ask_size\": 1}"
+            .to_owned(),
         "{\"symbol\": \"A\", \"ts\": 1}".to_owned(),
         "{\"symbol\": \"A\", \"kind\": \"quote\"}".to_owned(),
     ];
@@ -294,7 +296,8 @@ fn what_is_beyond_a_limit_is_refused_with_a_reason_of_its_own() {
         assert!(!refusals.is_empty() && refusals.iter().all(|entry| entry.contains(reason)), "{out}");
         // A minute of the feed has no more orders than are allowed.
         if out == "rate" {
-            let at = |entry: &String| serde_json::from_str::<serde_json::Value>(entry).unwrap()["order"]["decided_at"].as_i64();
+            let at =
+                |entry: &String| serde_json::from_str::<serde_json::Value>(entry).unwrap()["order"]["decided_at"].as_i64();
             let times: Vec<i64> = entries(&folder, out, "order").iter().filter_map(at).collect();
             assert!(times.len() > 5 && times.windows(6).all(|six| six[5] - six[0] >= 60_000_000_000));
         }
@@ -356,7 +359,11 @@ fn ctrl_c_and_the_kill_file_end_it_with_nothing_left_working() {
             input.write_all((lines[..800].join("\n") + "\n").as_bytes()).unwrap();
         }
         until_it_trades(&folder, out);
-        if by_file { std::fs::write(folder.path("stop"), "").unwrap() } else { interrupt(&child) }
+        if by_file {
+            std::fs::write(folder.path("stop"), "").unwrap()
+        } else {
+            interrupt(&child)
+        }
         let output = child.wait_with_output().unwrap();
         let told = String::from_utf8(output.stdout).unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
@@ -428,7 +435,14 @@ fn another_run_is_not_gone_on_with_and_damage_is_told() {
 #[test]
 fn limits_that_cannot_be_are_told_with_their_place() {
     let (folder, _) = scene();
-    let cases = ["max_order = 0", "max_loss = -1", "max_position = nan", "max_postion = 3", "on_loss = \"panic\"", "orders_a_minute = 0"];
+    let cases = [
+        "max_order = 0",
+        "max_loss = -1",
+        "max_position = nan",
+        "max_postion = 3",
+        "on_loss = \"panic\"",
+        "orders_a_minute = 0",
+    ];
     let mut told = String::new();
     for paper in cases {
         std::fs::write(folder.path("bad.toml"), format!("{RUN}\n[paper]\n{paper}\n")).unwrap();

@@ -275,7 +275,7 @@ mod tests {
             prop_assert_eq!(none, None);
             journal.add(&["more".to_owned()]).unwrap();
             drop(journal);
-            prop_assert_eq!(read(&path).unwrap().0.last().map(String::as_str), Some("more"));
+            prop_assert_eq!(read(&path).unwrap().0.pop(), Some("more".to_owned()));
         }
 
         /// A byte that was changed is found out: the end is cut, and anything before it an error with its line.

@@ -75,6 +75,12 @@ impl JsonRow {
         InputError::new(&self.source, message).at(Place::Row(self.line)).in_column(key)
     }
 
+    /// An error of the row as a whole with its line; one that has a place keeps it.
+    #[must_use]
+    pub fn placed(&self, error: InputError) -> InputError {
+        if error.place == Place::File { error.at(Place::Row(self.line)) } else { error }
+    }
+
     /// The keys but for `others`, as the columns of a table of one row: its cells are what a file would hold, and errors name line
     /// and key.
     ///

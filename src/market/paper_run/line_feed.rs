@@ -236,7 +236,7 @@ impl<T: Dated + Clone + PartialEq + Send> Stream<T> for LineRows<T> {
                 break;
             };
             let read = one(&row).and_then(|table| self.rows.read(&table, &mut |row| into.push(row)));
-            if let Err(error) = read {
+            if let Err(error) = read.map_err(|error| row.placed(error)) {
                 // What is looked at comes again, and is told then.
                 match (&lines.looked_at, lines.bad) {
                     (Some(_), BadRows::LeftOut) => {}
