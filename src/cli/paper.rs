@@ -84,7 +84,9 @@ impl Paper {
             (None, true) => (&self.out, Overwrite::Force),
             (None, false) => (&self.out, Overwrite::Refuse),
         };
-        OutputFolder::create(folder, overwrite)?.check_free(&RunOutputs::FILES)?;
+        if overwrite == Overwrite::Refuse {
+            OutputFolder::create(folder, overwrite)?.check_free(&RunOutputs::FILES)?;
+        }
         let stops = Stops::listen(settings.kill_file.as_deref().filter(|_| self.export.is_none()))?;
         let feed = match from_lines {
             true => PaperFeed::Lines(Box::new(StandardInput::open(stops.clone())), self.bad_rows()),

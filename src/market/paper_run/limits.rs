@@ -78,7 +78,7 @@ pub(super) struct Limited {
     /// When orders were let through within the last minute.
     sent: VecDeque<Timestamp>,
     start: Option<Cash>,
-    peak: Cash,
+    peak: Option<Cash>,
     /// Why and when trading stopped.
     lost: Option<Loss>,
     /// Orders that were taken back since.
@@ -103,7 +103,7 @@ const MINUTE: i64 = 60 * Timestamp::NANOS;
 impl Limited {
     pub fn new(inner: Box<dyn Strategy>, settings: PaperSettings) -> Self {
         let (sent, cancelled) = Default::default();
-        Self { inner, settings, sent, start: None, peak: Cash(0), lost: None, cancelled }
+        Self { inner, settings, sent, start: None, peak: None, lost: None, cancelled }
     }
 
     /// Why and when trading stopped, if it did.
@@ -115,9 +115,10 @@ impl Limited {
     fn may_trade(&mut self, view: &View<'_>) -> bool {
         let equity = view.equity();
         let start = *self.start.get_or_insert(equity);
-        self.peak = if self.peak == Cash(0) { equity } else { self.peak.max(equity) };
+        let peak = self.peak.map_or(equity, |peak| peak.max(equity));
+        self.peak = Some(peak);
         let lost_from = |from: Cash| from.to_f64() - equity.to_f64();
-        let [from_start, from_peak] = [start, self.peak].map(lost_from);
+        let [from_start, from_peak] = [start, peak].map(lost_from);
         let limits =
             [("max_loss", self.settings.max_loss, from_start), ("max_drawdown", self.settings.max_drawdown, from_peak)];
         if self.lost.is_none() {
