@@ -293,3 +293,89 @@ fn same_run(path: &Path, of: &Header, own: &Header) -> Result<(), InputError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::entry::StopReason;
+    use super::*;
+    use proptest::prelude::*;
+    use tempfile::TempDir;
+
+    fn header() -> Header {
+        let (schema, version, run_sha256) = (SCHEMA.to_owned(), "0.1.0".to_owned(), "ab".to_owned());
+        Header { schema, version, run_sha256, seed: 7, feed: FeedFrom::Files }
+    }
+
+    fn row(price: f64) -> StoredRow {
+        StoredRow::Trade { time: 1, known_at: 2, price, size: 3.0, buy: None }
+    }
+
+    /// A journal of two rows of two streams.
+    fn begun(folder: &TempDir) -> PathBuf {
+        let path = folder.path().join("journal.jsonl");
+        let mut log = PaperLog::create(&path, &header(), JournalSync::Asked).unwrap();
+        log.add(&[Entry::Row { stream: 1, row: row(1.0) }, Entry::Row { stream: 0, row: row(2.0) }]).unwrap();
+        path
+    }
+
+    #[test]
+    fn rows_come_back_stream_by_stream_and_new_ones_are_added() {
+        let folder = TempDir::new().unwrap();
+        let path = begun(&folder);
+        let (mut log, cut) = PaperLog::resume(&path, &header(), JournalSync::Asked).unwrap();
+        assert!(cut.is_none() && log.is_replaying().unwrap());
+        assert_eq!((log.next_row(0).unwrap(), log.next_row(0).unwrap()), (Some(row(2.0)), None));
+        assert_eq!((log.next_row(1).unwrap(), log.is_replaying().unwrap()), (Some(row(1.0)), false));
+        log.add(&[Entry::Stop(Stop { why: StopReason::KillFile, after: 5 }), Entry::Closed {}]).unwrap();
+        drop(log);
+        let refused = PaperLog::resume(&path, &header(), JournalSync::Asked).unwrap_err().to_string();
+        assert!(refused.contains("the session has ended") && refused.contains("hint: "), "{refused}");
+        let (log, _) = PaperLog::read(&path, &header()).unwrap();
+        assert_eq!(log.stop.map(|stop| stop.after), Some(5));
+    }
+
+    #[test]
+    fn another_run_is_refused_by_what_differs() {
+        let folder = TempDir::new().unwrap();
+        let path = begun(&folder);
+        let cases = [
+            (Header { version: "9".into(), ..header() }, "version"),
+            (Header { run_sha256: "cd".into(), ..header() }, "RUN.toml"),
+            (Header { seed: 8, ..header() }, "seed 7, this is 8"),
+            (Header { feed: FeedFrom::Lines, ..header() }, "--feed"),
+        ];
+        for (other, word) in cases {
+            let refused = PaperLog::resume(&path, &other, JournalSync::Asked).unwrap_err().to_string();
+            assert!(refused.contains(word) && refused.contains("hint: "), "{refused}");
+        }
+    }
+
+    proptest! {
+        /// Lines with the right checksums that hold anything at all give an error with their place, or entries.
+        #[test]
+        fn nonsense_is_an_error_and_no_panic(
+            lines in proptest::collection::vec(prop_oneof![
+                "[ -~]{0,40}",
+                Just("{\"row\":{\"stream\":99999999999,\"row\":{\"trade\":{}}}}".to_owned()),
+                Just("{\"row\":{\"stream\":9999999,\"row\":{\"trade\":{\"time\":1,\"known_at\":1,\"price\":1,\"size\":1,\"buy\":null}}}}".to_owned()),
+                Just("{\"line\":{\"line\":1,\"text\":\"x\"}}".to_owned()),
+                Just("{\"stop\":{\"why\":\"end_of_feed\",\"after\":3}}".to_owned()),
+                Just("{\"closed\":{}}".to_owned()),
+            ], 0..6)
+        ) {
+            let folder = TempDir::new().unwrap();
+            let path = begun(&folder);
+            let (mut journal, _) = Journal::open(&path, JournalSync::Asked, |_, _| Ok(())).unwrap();
+            journal.add(&lines).unwrap();
+            drop(journal);
+            let read = || -> Result<(), InputError> {
+                let (mut log, _) = PaperLog::read(&path, &header())?;
+                while log.next_row(0)?.is_some() || log.next_text()?.is_some() {}
+                log.all_done()
+            };
+            if let Err(error) = read() {
+                prop_assert!(error.path == path && error.hint.is_some(), "{error}");
+            }
+        }
+    }
+}
