@@ -108,6 +108,7 @@ fn every_command_explains_itself() {
         "diagnose",
         "calibrate",
         "backtest",
+        "paper",
         "audit",
         "sweep",
         "walk-forward",

@@ -12,8 +12,10 @@ mod csv;
 mod equations;
 mod history;
 mod journal;
+mod json_row;
 mod orders;
 mod paper;
+mod paper_log;
 mod run;
 mod scene;
 mod stream;
@@ -33,7 +35,7 @@ use scene::Scene;
 type Target = (&'static str, fn(&Scene, &[u8]));
 
 /// The targets, by their names, which are those of their folders in `fuzz/seeds`.
-const TARGETS: [Target; 20] = [
+const TARGETS: [Target; 22] = [
     ("account", account::target),
     ("arrow", columnar::arrow),
     ("chunks", stream::chunks),
@@ -42,8 +44,10 @@ const TARGETS: [Target; 20] = [
     ("gzip", csv::compressed),
     ("history", history::target),
     ("journal", journal::target),
+    ("json_row", json_row::target),
     ("orders", orders::target),
     ("paper_json", paper::json),
+    ("paper_log", paper_log::target),
     ("paper_sqlite", paper::sqlite),
     ("paper_table", paper::table),
     ("paper_xml", paper::xml),

@@ -131,7 +131,8 @@ pub(super) fn explained_strategy(file: &RunFile, error: &StrategyError) -> Input
     }
 }
 
-fn told(outputs: &RunOutputs, screen: &Screen) -> String {
+/// The figures of a run.
+pub(super) fn told(outputs: &RunOutputs, screen: &Screen) -> String {
     let mut table = screen.table(["figure", ">value"]);
     for metric in &outputs.page.metrics {
         table.add_row([metric.name.clone(), metric.value.clone().unwrap_or_else(|| UNDEFINED.to_owned())]);

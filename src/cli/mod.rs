@@ -14,6 +14,7 @@ mod diagnose;
 mod figures;
 mod fitted;
 mod mechanisms;
+mod paper;
 mod paper_log;
 mod prove;
 mod reconcile;
@@ -58,6 +59,7 @@ enum Command {
     Diagnose(diagnose::Diagnose),
     Calibrate(calibrate::Calibrate),
     Backtest(backtest::Run),
+    Paper(paper::Paper),
     Reconcile(reconcile::Reconcile),
     Audit(audit::Look),
     Sweep(sweep::Try),
@@ -102,6 +104,7 @@ impl Command {
             Self::Diagnose(command) => command.run(screen),
             Self::Calibrate(command) => command.run(screen),
             Self::Backtest(command) => command.run(screen),
+            Self::Paper(command) => command.run(screen),
             Self::Reconcile(command) => command.run(screen),
             Self::Audit(command) => command.run(screen),
             Self::Sweep(command) => command.run(screen),

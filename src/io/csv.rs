@@ -67,6 +67,12 @@ impl CsvText {
         Ok(Self { text, names: self.names.clone(), rows, header_line: self.header_line })
     }
 
+    /// The same, with its rows from line `line` on: for text that stands elsewhere in the file.
+    pub(super) fn at_line(mut self, line: usize) -> Self {
+        self.rows.lines.iter_mut().enumerate().for_each(|(row, own)| *own = line + row);
+        self
+    }
+
     /// What a later block needs of this one.
     pub(super) fn without_rows(&self) -> Self {
         let rows = Rows { starts: Vec::new(), ends: Vec::new(), lines: Vec::new(), next_line: self.rows.next_line };

@@ -140,6 +140,8 @@ struct RunTable {
     _matching: Option<IgnoredAny>,
     #[serde(rename = "latency")]
     _latency: Option<IgnoredAny>,
+    #[serde(rename = "paper")]
+    _paper: Option<IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -153,8 +155,21 @@ impl RunFile {
     /// # Errors
     /// As [`read_toml`](super::read_toml); values out of their range; instruments and data that do not belong together.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
-        let run = Self::parse(Document::read(path)?)?;
-        for (index, data) in run.data.iter().enumerate() {
+        Self::parse(Document::read(path)?)?.resolved(|_| true)
+    }
+
+    /// As [`read`](Self::read), but the files of market data need not exist: their rows come from elsewhere.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_without_market(path: impl AsRef<Path>) -> Result<Self, InputError> {
+        Self::parse(Document::read(path)?)?.resolved(|kind| kind == FeedKind::Actions)
+    }
+
+    /// The same with paths that start from where the program runs; files that it names must exist, of data those whose kind `must`.
+    fn resolved(self, must: impl Fn(FeedKind) -> bool) -> Result<Self, InputError> {
+        let run = self;
+        for (index, data) in run.data.iter().enumerate().filter(|(_, data)| must(data.kind)) {
             let number = index.to_string();
             check_file(&run.document, &["data", &number, data.kind.word()], &data.path.to_string_lossy())?;
             if let Some(snapshot) = &data.format.snapshot {
@@ -274,6 +289,14 @@ impl RunFile {
         self.document.parse::<OnlyLatency<T>>().map(|only| only.latency)
     }
 
+    /// `[paper]`, what holds a paper run within bounds; the default where there is none. A backtest has no use for it.
+    ///
+    /// # Errors
+    /// Whatever `T` refuses, with line and column.
+    pub fn paper<T: DeserializeOwned + Default>(&self) -> Result<T, InputError> {
+        self.document.parse::<OnlyPaper<T>>().map(|only| only.paper)
+    }
+
     /// An error about the key at `keys`, such as `["strategy", "kind"]`.
     #[must_use]
     pub fn error(&self, keys: &[&str], message: impl Into<String>) -> InputError {
@@ -308,6 +331,13 @@ struct OnlyMatching<T> {
 struct OnlyLatency<T> {
     #[serde(default)]
     latency: T,
+}
+
+#[derive(Deserialize)]
+#[serde(bound = "T: Deserialize<'de> + Default")]
+struct OnlyPaper<T> {
+    #[serde(default)]
+    paper: T,
 }
 
 /// A `T` read from a table without its key `kind`.

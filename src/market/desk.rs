@@ -26,6 +26,9 @@ impl Session<'_> {
                 },
                 Request::Cancel(id) => self.post(id, now, Due::Cancel(id)),
                 Request::Replace { id, quantity, price } => self.post(id, now, Due::Replace(id, quantity, price)),
+                Request::Refused { instrument, side, quantity, reason } => {
+                    self.blotter.reject(Rejection { decided_at: now, instrument, side, quantity, reason });
+                }
                 Request::Wake(time) => self.agenda.put(time.max(now), Phase::Notices, Due::Wake),
             }
         }

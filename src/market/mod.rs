@@ -50,6 +50,8 @@ mod order;
 mod order_log;
 mod own_print;
 pub mod paper;
+#[cfg(feature = "io")]
+pub mod paper_run;
 mod past;
 mod price_assumption;
 mod quote;

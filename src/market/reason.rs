@@ -55,6 +55,16 @@ pub enum Reason {
     Split,
     /// It is about an order of the broker's.
     NotOwn,
+    /// It is larger than the largest order allowed.
+    OrderLimit,
+    /// It could take what is held beyond the largest position allowed.
+    PositionLimit,
+    /// There were as many orders within a minute as are allowed.
+    OrderRate,
+    /// Trading has stopped: too much was lost.
+    LossLimit,
+    /// The session was stopped.
+    Stopped,
 }
 
 impl Reason {
@@ -85,6 +95,11 @@ impl Reason {
             Self::Liquidated => "liquidated",
             Self::Split => "split",
             Self::NotOwn => "not_own",
+            Self::OrderLimit => "order_limit",
+            Self::PositionLimit => "position_limit",
+            Self::OrderRate => "order_rate",
+            Self::LossLimit => "loss_limit",
+            Self::Stopped => "stopped",
         }
     }
 }
@@ -115,6 +130,11 @@ impl fmt::Display for Reason {
             Self::Liquidated => "the account could not carry it any longer",
             Self::Split => "a split took it off ticks or lots",
             Self::NotOwn => "it is about an order of the broker's",
+            Self::OrderLimit => "it is larger than the largest order allowed",
+            Self::PositionLimit => "it could exceed the largest position allowed",
+            Self::OrderRate => "there were as many orders within a minute as are allowed",
+            Self::LossLimit => "trading has stopped: too much was lost",
+            Self::Stopped => "the session was stopped",
         })
     }
 }

@@ -40,8 +40,25 @@ impl Beside {
     /// # Errors
     /// A file that cannot be read any more.
     pub fn inputs(&self, run: &RunFile, rows: &[Option<usize>]) -> Result<Vec<InputFile>, InputError> {
+        self.inputs_with(run, rows, |_| true)
+    }
+
+    /// The same without market data, whose rows come from elsewhere.
+    ///
+    /// # Errors
+    /// A file that cannot be read any more.
+    pub fn inputs_without_market(&self, run: &RunFile) -> Result<Vec<InputFile>, InputError> {
+        self.inputs_with(run, &[], |kind| kind == FeedKind::Actions)
+    }
+
+    fn inputs_with(
+        &self,
+        run: &RunFile,
+        rows: &[Option<usize>],
+        with: impl Fn(FeedKind) -> bool,
+    ) -> Result<Vec<InputFile>, InputError> {
         let mut inputs = self.calendars.files.clone();
-        for (number, entry) in run.data.iter().enumerate() {
+        for (number, entry) in run.data.iter().enumerate().filter(|(_, entry)| with(entry.kind)) {
             let of = |rows: &[Option<usize>]| rows.get(number).copied().flatten();
             let rows = of(&self.rows).or(of(rows));
             inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows });

@@ -54,7 +54,7 @@ fn input(run: &RunFile, error: StreamError) -> InputError {
 }
 
 /// The streams of a run, of each instrument those of its files.
-fn sources(run: &RunFile) -> Result<Vec<Sources>, InputError> {
+pub(super) fn sources(run: &RunFile) -> Result<Vec<Sources>, InputError> {
     let of = |(index, symbol): (usize, &str)| {
         let mut sources = Sources::default();
         let mut entries = run.data.iter().filter(|e| e.symbol == symbol && e.kind != FeedKind::Actions).peekable();

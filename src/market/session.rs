@@ -22,6 +22,7 @@ use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
 use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger, Orders, Reference, Strategy};
 
+mod clocked;
 mod exchange;
 mod quiet;
 mod telling;
@@ -215,6 +216,12 @@ impl<'d> Session<'d> {
     /// # Errors
     /// As [`Backtest::run`].
     pub fn step(&mut self, strategy: &mut dyn Strategy) -> Result<Option<Event>, BacktestError> {
+        self.step_until(Timestamp::MAX, strategy)
+    }
+
+    /// The same, but for what happens after `until`.
+    #[inline(always)]
+    fn step_until(&mut self, until: Timestamp, strategy: &mut dyn Strategy) -> Result<Option<Event>, BacktestError> {
         loop {
             let (data, shown) = (self.feed.peek(), self.transit.peek());
             let next = match (data, shown) {
@@ -222,6 +229,9 @@ impl<'d> Session<'d> {
                 (Some(next), None) | (None, Some(next)) => next,
                 (None, None) => return Ok(None),
             };
+            if until < Timestamp::MAX && self.agenda.peek().map_or(next, |(at, _)| at.min(next)) > until {
+                return Ok(None);
+            }
             if self.agenda.peek().is_some_and(|due| due < (next, Phase::Data) && !self.a_bar_ends_first(due)) {
                 if let Some(event) = self.act(Some(strategy))? {
                     return Ok(Some(event));

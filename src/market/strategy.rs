@@ -334,6 +334,11 @@ impl Orders {
         &self.requests
     }
 
+    /// Turns what was asked for into something else, request by request.
+    pub(super) fn turn(&mut self, turned: impl FnMut(Request) -> Request) {
+        self.requests = std::mem::take(&mut self.requests).into_iter().map(turned).collect();
+    }
+
     /// Forgets it all; numbers go on.
     pub fn clear(&mut self) {
         self.requests.clear();

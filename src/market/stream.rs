@@ -29,6 +29,8 @@ mod quote_rows;
 #[cfg(feature = "io")]
 mod sequence;
 mod stored;
+#[cfg(feature = "io")]
+mod table_rows;
 
 use crate::sim2real::Timestamp;
 
@@ -43,6 +45,8 @@ pub use file_stream::FileStream;
 #[cfg(feature = "io")]
 pub(super) use file_stream::bars_of;
 pub use stored::Stored;
+#[cfg(feature = "io")]
+pub(super) use table_rows::{TableRows, check_rows};
 
 /// A source of rows of market data.
 ///

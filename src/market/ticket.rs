@@ -3,7 +3,7 @@
 use crate::sim2real::Timestamp;
 
 use super::account::Ratio;
-use super::{Increments, Price, Quantity, Side};
+use super::{Increments, Price, Quantity, Reason, Side};
 
 /// The number of an order within its run, from 1 in the order in which they were asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -295,4 +295,15 @@ pub enum Request {
     },
     /// To be woken at an instant.
     Wake(Timestamp),
+    /// Nothing: what was asked for is beyond a limit, and is refused.
+    Refused {
+        /// Number of the instrument.
+        instrument: usize,
+        /// Which way.
+        side: Side,
+        /// How much.
+        quantity: Quantity,
+        /// Which limit.
+        reason: Reason,
+    },
 }

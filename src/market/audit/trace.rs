@@ -155,6 +155,7 @@ impl Happened for Decision {
     fn instrument(&self) -> Option<usize> {
         match self.request {
             Request::Submit(_, ticket) => Some(ticket.instrument),
+            Request::Refused { instrument, .. } => Some(instrument),
             Request::Cancel(_) | Request::Replace { .. } | Request::Wake(_) => None,
         }
     }
@@ -173,6 +174,9 @@ impl Happened for Decision {
             Request::Replace { id, quantity, price: to } => {
                 let quantity = quantity.map(|q| format!(" {}", q.to_f64())).unwrap_or_default();
                 format!("replace order {}:{quantity}{}", id.0, to.map(price).unwrap_or_default())
+            }
+            Request::Refused { side, quantity, reason, .. } => {
+                format!("{} {} refused: {reason}", side.word(), quantity.to_f64())
             }
             Request::Wake(time) => format!("wake at {time}"),
         }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::io::{ClockOffset, FeedFormat, FeedKind, InputError, Layout, Table, TableChunks};
 use crate::market::{Bar, Book, DataNotes, DepthChange, OrderEvent, Print};
+use crate::sim2real::Timestamp;
 
 use super::bar_rows::BarRows;
 use super::binance_depth::BinanceDepth;
@@ -111,7 +112,8 @@ impl<T: Dated + Clone + PartialEq> FileStream<T> {
         // An error is an end, too.
         self.state = State::Ended;
         let Some(table) = self.chunks.next_table()? else {
-            finish(&mut *self.decode, &mut self.rows, &self.format, into);
+            let rules = self.format.rules;
+            finish(&mut *self.decode, &mut self.rows, (rules.until, rules.max_gap), into);
             return Ok(false);
         };
         decode(&table, &mut *self.decode, &self.order_column, &mut self.rows, into)?;
@@ -121,7 +123,7 @@ impl<T: Dated + Clone + PartialEq> FileStream<T> {
 }
 
 /// Reads one table.
-fn decode<T: Dated + Clone + PartialEq>(
+pub(super) fn decode<T: Dated + Clone + PartialEq>(
     table: &Table,
     decode: &mut dyn Decode<T>,
     order_column: &str,
@@ -132,18 +134,18 @@ fn decode<T: Dated + Clone + PartialEq>(
     decode.decode(table, &mut Emit { table, order_column, rows, into })
 }
 
-/// Gives out what was held back.
-fn finish<T: Dated + Clone + PartialEq>(
+/// Gives out what was held back; `until` is the time up to which there should be data, beside the longest gap that is none [ns].
+pub(super) fn finish<T: Dated + Clone + PartialEq>(
     decode: &mut dyn Decode<T>,
     rows: &mut Kept<T>,
-    format: &FeedFormat,
+    (until, max_gap): (Option<Timestamp>, Option<i64>),
     into: &mut dyn FnMut(T),
 ) {
     for last in decode.last() {
         rows.sequence.push(last);
     }
     rows.give(true, into);
-    rows.notes.end(format.rules.until, format.rules.max_gap);
+    rows.notes.end(until, max_gap);
 }
 
 impl FileStream<Known<Book>> {
@@ -168,7 +170,7 @@ pub(in crate::market) fn bars_of(
     let mut bars = Vec::with_capacity(table.rows());
     let order_column = BarRows::time_column(format);
     decode(table, &mut reader, order_column, &mut kept, &mut |bar| bars.push(bar))?;
-    finish(&mut reader, &mut kept, format, &mut |bar| bars.push(bar));
+    finish(&mut reader, &mut kept, (rules.until, rules.max_gap), &mut |bar| bars.push(bar));
     Ok((bars, kept.notes))
 }
 
