@@ -126,7 +126,8 @@ pub fn paper(folder: &Folder, arguments: &str) -> Child {
 pub fn entries(folder: &Folder, out: &str, kind: &str) -> Vec<String> {
     let text = String::from_utf8_lossy(&folder.bytes(&format!("{out}/journal.jsonl"))).into_owned();
     let begins = format!("{{\"{kind}\"");
-    text.lines().filter_map(|line| line.get(9..)).filter(|entry| entry.starts_with(&begins)).map(str::to_owned).collect()
+    let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
+    whole.lines().filter_map(|line| line.get(9..)).filter(|entry| entry.starts_with(&begins)).map(str::to_owned).collect()
 }
 
 pub fn is_closed(folder: &Folder, out: &str) -> bool {
