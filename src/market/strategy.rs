@@ -335,6 +335,7 @@ impl Orders {
     }
 
     /// Turns what was asked for into something else, request by request.
+    #[cfg(feature = "io")]
     pub(super) fn turn(&mut self, turned: impl FnMut(Request) -> Request) {
         self.requests = std::mem::take(&mut self.requests).into_iter().map(turned).collect();
     }

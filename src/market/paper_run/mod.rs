@@ -10,6 +10,7 @@ mod limits;
 mod line_feed;
 mod paper_log;
 mod prepare;
+mod stopping;
 mod stored_row;
 mod trading;
 
