@@ -16,7 +16,7 @@ use session_scene::{RUN, Walk, entries, fed, interrupt, is_closed, paper, scene,
 fn killed_over_and_over(folder: &Folder, out: &str, arguments: &str, feed: Option<&[String]>, walk: &mut Walk) -> usize {
     let (mut kills, begun) = (0, Instant::now());
     loop {
-        assert!(begun.elapsed() < Duration::from_secs(240), "it comes to no end");
+        assert!(begun.elapsed() < Duration::from_secs(900), "it comes to no end");
         if is_closed(folder, out) {
             return kills;
         }
@@ -38,7 +38,7 @@ fn killed_over_and_over(folder: &Folder, out: &str, arguments: &str, feed: Optio
             }
         });
         // Longer each time: what was done before is done again first, and takes as long as the machine lets it.
-        let life = Duration::from_millis(20 + walk.next(200) + 25 * kills as u64);
+        let life = Duration::from_millis(20 + walk.next(200) + 60 * kills as u64);
         let until = Instant::now() + life;
         let ended = loop {
             if let Some(status) = child.try_wait().unwrap() {

@@ -199,7 +199,7 @@ fn what_is_written_reads_back_as_what_happened() {
     // Prices and fees are integers of 1e-9 and 1e-18: what is written is the nearest number, to the bit.
     let prices: Vec<f64> = record.blotter.fills.iter().map(|fill| fill.price.to_f64()).collect();
     assert_eq!(fills.floats_complete("price").unwrap(), prices);
-    let fees: Vec<f64> = record.blotter.fills.iter().map(|fill| fill.fee.to_f64()).collect();
+    let fees: Vec<f64> = record.blotter.fills.iter().map(|fill| fill.fee.nearest_f64()).collect();
     assert_eq!(fills.floats_complete("fee").unwrap(), fees);
     assert_eq!(equity.floats_complete("equity").unwrap().last(), record.equity.last().map(|point| &point.equity));
     assert_eq!(equity.rows(), record.equity.len());
