@@ -3,14 +3,14 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 use proptest::prelude::*;
-use trueup::market::paper::{OrderWords, PaperFill, PaperLog, PaperOrder, SourcePlace};
+use trueup::market::paper::{FindingKind, OrderWords, PaperFill, PaperFinding, PaperLog, PaperOrder, SourcePlace};
 use trueup::market::reconcile::{
     Cause, Compared, Histories, Life, Lives, Reconciliation, Showing, Tolerance, assert_reconciles, clock_difference, lives,
     reconcile, replay,
 };
 use trueup::market::{
-    Backtest, Cash, Execution, History, Instrument, Level, MECHANISMS, Orders, Price, Quantity, Quotes, Reference, Settings,
-    Side, Strategy, View,
+    Backtest, Cash, Execution, History, Instrument, Level, MECHANISMS, Multiplier, Orders, Price, Quantity, Quotes,
+    Reference, Settings, Side, Strategy, View,
 };
 use trueup::sim2real::{Assembly, Seed, Timestamp};
 
@@ -269,6 +269,38 @@ fn amounts_are_those_the_log_was_made_with() {
     assert_eq!((bands.executions, bands.better), (ORDERS, 0));
     assert!(bands.worse > ORDERS / 2, "{bands:?}");
     assert!(bands.pessimistic <= bands.optimistic);
+}
+
+/// A contract of fifty units makes fifty times of all that prices make, and once of what fees do.
+#[test]
+fn contracts_count_as_often_as_they_have_units() {
+    let (quotes, decided) = (quotes(9), decided(9));
+    let reality = Reality { half_spreads: 1.0, fee_bps: 2.0, ..IDEAL };
+    let gaps = |units: i64| {
+        let [own, other] = [IDEAL, reality].map(|reality| {
+            let mut lives = lives(&log(&decided, &quotes, &reality)).unwrap();
+            lives.orders.iter_mut().for_each(|life| life.multiplier = Multiplier::new(units).unwrap());
+            lives
+        });
+        let compared = Compared { backtest: &own, paper: &other, replayed: None, showing: None, seed: Seed(1) };
+        let found = reconcile(&compared).unwrap();
+        sums_exactly(&found);
+        (amount(&found, Cause::Price), amount(&found, Cause::Fees), found.orders[0].fee_bps.unwrap())
+    };
+    let (one, fifty) = (gaps(1), gaps(50));
+    assert!((fifty.0 - 50.0 * one.0).abs() < 1e-9 * fifty.0.abs() && one.0 < 0.0, "{one:?} {fifty:?}");
+    assert_eq!(fifty.1, one.1);
+    assert!((fifty.2 * 50.0 - one.2).abs() < 1e-9, "{one:?} {fifty:?}");
+}
+
+/// Whoever compares a log is told what was odd about it, where that bears on the comparison.
+#[test]
+fn what_was_odd_about_a_log_is_told_beside() {
+    let mut log = log(&decided(10), &quotes(10), &IDEAL);
+    log.findings.add(PaperFinding::of_log(FindingKind::PolledTimes, "filled_at is when the bot asked"));
+    log.findings.add(PaperFinding::of_log(FindingKind::RoundedNumber, "digits below 1e-9"));
+    let notes = lives(&log).unwrap().notes;
+    assert_eq!(notes, ["times are when a bot asked, not when it happened (1; the first: filled_at is when the bot asked)"]);
 }
 
 /// Paper that decides two seconds later decides on other prices.

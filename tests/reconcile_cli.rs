@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use assert_cmd::Command;
+use trueup::io::{OutputFolder, OutputTable, Overwrite, Table, TimeFormat};
+use trueup::sim2real::Timestamp;
 
 struct Scene(tempfile::TempDir);
 
@@ -83,6 +85,46 @@ fn what_parts_further_than_a_bound_fails_and_says_why() {
     let (code, _, errors) = scene.reconciled(&[&PAPER[..], &["--out", "told"]].concat());
     assert!(code == Some(2) && errors.contains("--force"), "{errors}");
     assert_eq!(std::fs::read(scene.path("told/report.html")).unwrap(), before);
+}
+
+/// Times of another zone are put right by themselves; other offsets only where the user says that they are of clocks.
+#[test]
+fn a_zone_is_put_right_and_a_clock_where_it_is_said_to_be_one() {
+    let scene = Scene::new();
+    let tables = ["orders", "fills"].map(|what| Table::read(scene.path(&format!("own/{what}.parquet"))).unwrap());
+    let shifted = |seconds: i64| {
+        let of = |table: &Table, columns: [&str; 5]| {
+            let time = |column: &str| table.times(column, &TimeFormat::default()).unwrap();
+            let moved = time(columns[0]).into_iter().map(|at| at + seconds * Timestamp::NANOS);
+            let text = |column: &str| table.texts_complete(column).unwrap();
+            let mut out = OutputTable::new().times(columns[0], moved);
+            for column in &columns[1..4] {
+                out = out.texts(column, text(column));
+            }
+            out.texts(columns[4], text(columns[4]))
+        };
+        let mut folder = OutputFolder::create(scene.path("shifted"), Overwrite::Force).unwrap();
+        let orders = of(&tables[0], ["decided_at", "order_id", "symbol", "side", "qty"]);
+        let orders = orders.texts("type", tables[0].texts_complete("type").unwrap());
+        folder.table("orders.parquet", &orders).unwrap();
+        folder.table("fills.parquet", &of(&tables[1], ["filled_at", "order_id", "qty", "price", "fee"])).unwrap();
+        folder.finish().unwrap();
+    };
+    let reconciled = |more: &[&str]| {
+        let paper = ["--paper", "shifted/orders.parquet", "shifted/fills.parquet", "--run", "run.toml", "--json"];
+        let (code, told, errors) = scene.reconciled(&[&paper[..], more].concat());
+        assert_eq!((code, errors.as_str()), (Some(0), ""));
+        let found: serde_json::Value = serde_json::from_str(&told).unwrap();
+        let moved =
+            found["notes"].as_array().unwrap().iter().any(|note| note.as_str().unwrap().contains("its times are moved"));
+        (found["counts"]["pairs"].as_u64().unwrap(), moved, found["gaps"][0]["causes"].as_array().unwrap().len())
+    };
+    shifted(5 * 3_600);
+    assert_eq!(reconciled(&[]), (195, true, 0));
+    shifted(70);
+    let (pairs, moved, causes) = reconciled(&[]);
+    assert!(pairs == 195 && !moved && causes > 0);
+    assert_eq!(reconciled(&["--correct-clock"]), (195, true, 0));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::report::quantity::UNDEFINED;
 use crate::strategies::{self, StrategyError};
 
 use super::checkpoint::{Going, Ran, Turn};
-use super::screen::Screen;
+use super::screen::{self, Screen};
 use super::stop::{Outcome, Stop};
 
 /// Run a strategy on past bars or quotes, event by event
@@ -79,8 +79,7 @@ impl Run {
                 outputs.write(&mut output)?;
                 let paths = output.finish()?;
                 if !self.json {
-                    text += "\n";
-                    paths.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+                    text += &screen::written(&paths);
                 }
             }
             None if !self.json => text += "\nNothing was written; --out DIR writes tables and a report.\n",

@@ -11,7 +11,7 @@ use crate::sim2real::diagnose::{Diagnosis, EXPERIMENT_FILE, Excitation, Verdict}
 
 use super::case::{Case, Diagnosed};
 use super::figures::figures;
-use super::screen::Screen;
+use super::screen::{self, Screen};
 use super::stop::{Outcome, Stop};
 
 mod told;
@@ -104,8 +104,7 @@ impl Diagnose {
         if let Some(folder) = &self.out {
             let paths = write(diagnosed, &file, folder, overwrite)?;
             if !self.json {
-                text += "\n";
-                paths.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+                text += &screen::written(&paths);
             }
         } else if !self.json {
             text += "\nNothing was written; --out DIR writes diagnosis.json, trued.toml and report.html.\n";

@@ -16,7 +16,7 @@ use crate::market::paper_run::{
 use crate::market::{Reason, Record, RunOutputs};
 
 use super::backtest::{strategy, told};
-use super::screen::{Progress, Screen};
+use super::screen::{self, Progress, Screen};
 use super::stop::{Outcome, Stop};
 use clock::{PaperClock, Speed, speed};
 use standard_input::StandardInput;
@@ -260,7 +260,6 @@ fn ended(
         text +=
             &format!("Rows of the feed: {} taken, {} left out, {} known already.\n", seen.rows, seen.refused, seen.known);
     }
-    text += "\n";
-    written.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+    text += &screen::written(written);
     text
 }

@@ -18,8 +18,8 @@ use crate::market::reconcile::{
 use crate::market::{MoneyError, Multiplier, PreparedRun, explained, prepare_run};
 use crate::sim2real::Seed;
 
-use super::paper_log::LogArguments;
-use super::screen::{Progress, Screen};
+use super::log_arguments::LogArguments;
+use super::screen::{self, Progress, Screen};
 use super::stop::{Outcome, Stop};
 
 /// Compare a backtest with a paper log, order by order: where they part, by how much, and why
@@ -51,7 +51,7 @@ pub(super) struct Reconcile {
     #[arg(long, value_name = "FILE|KEY=VALUE")]
     tolerance: Vec<String>,
     /// Take the whole difference of stamps as one of clocks; of itself only one of whole zones is taken for that
-    #[arg(long)]
+    #[arg(long, requires = "backtest")]
     correct_clock: bool,
     /// Folder to write reconcile.json, report.html and, with --tolerance, junit.xml into
     #[arg(long, value_name = "DIR")]
@@ -163,8 +163,7 @@ impl Reconcile {
                 }
                 let paths = output.finish()?;
                 if !self.json {
-                    text += "\n";
-                    paths.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+                    text += &screen::written(&paths);
                 }
             }
             None if !self.json => text += "\nNothing was written; --out DIR writes a report.\n",

@@ -1,6 +1,7 @@
 //! The terminal: results on standard output, progress on standard error.
 
 use std::io::{ErrorKind, IsTerminal, Write};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -99,6 +100,11 @@ impl Screen {
 /// A table below its title, with blank lines around.
 pub(super) fn titled(title: &str, table: &Table) -> String {
     format!("\n{title}\n\n{}\n", table.trim_fmt())
+}
+
+/// What was written, a line each, below what is told.
+pub(super) fn written(paths: &[PathBuf]) -> String {
+    paths.iter().fold("\n".to_owned(), |text, path| text + &format!("Written: {}\n", path.display()))
 }
 
 fn bar() -> ProgressBar {

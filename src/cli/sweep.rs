@@ -14,7 +14,7 @@ use crate::market::{Cash, Ledger, Record, Strategy, prepare_run};
 use crate::strategies::{STRATEGIES, StrategyError};
 
 use super::backtest::{explained_strategy, strategy_table};
-use super::screen::{Screen, titled};
+use super::screen::{self, Screen, titled};
 use super::stop::{Outcome, Stop};
 
 mod journal;
@@ -89,8 +89,7 @@ impl Try {
             output.file(page, summary.page(&section, &trials).render()?.as_bytes())?;
             let paths = output.finish()?;
             if !self.json {
-                text += "\n";
-                paths.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+                text += &screen::written(&paths);
             }
         } else if !self.json {
             text += "\nNothing was written; --out DIR writes every run, and a report.\n";

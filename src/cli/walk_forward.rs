@@ -9,7 +9,7 @@ use crate::market::prepare_run;
 use crate::market::sweep::{Sweep, plan};
 use crate::market::walk_forward::WalkForward;
 
-use super::screen::{Screen, titled};
+use super::screen::{self, Screen, titled};
 use super::stop::{Outcome, Stop};
 use super::sweep::{belongs, make, section};
 
@@ -80,8 +80,7 @@ impl Walk {
             output.file(page, walk.page().render()?.as_bytes())?;
             let paths = output.finish()?;
             if !self.json {
-                text += "\n";
-                paths.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+                text += &screen::written(&paths);
             }
         } else if !self.json {
             text += "\nNothing was written; --out DIR writes tables and a report.\n";

@@ -8,8 +8,8 @@ use crate::io::{InputError, OutputFolder, Overwrite};
 use crate::market::paper::PaperLog;
 use crate::market::paper::import::import;
 
-use super::super::paper_log::LogArguments;
-use super::super::screen::Screen;
+use super::super::log_arguments::LogArguments;
+use super::super::screen::{self, Screen};
 use super::super::stop::{Outcome, Stop};
 use super::told::told;
 
@@ -61,8 +61,7 @@ impl Import {
             Some(folder) => {
                 let written = write(&log, &json, OutputFolder::create(folder, overwrite)?)?;
                 if !self.json {
-                    text += "\n";
-                    written.iter().for_each(|path| text += &format!("Written: {}\n", path.display()));
+                    text += &screen::written(&written);
                 }
             }
             None if !self.json => text += "\nNothing was written; --out DIR writes tables and findings.\n",

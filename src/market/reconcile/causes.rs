@@ -172,8 +172,8 @@ pub(super) fn of_both(
         own.add(Cause::Sizing, parts.sizing)?;
         own.add(Cause::QueueFill, Cash::ZERO.minus(parts.sizing)?)?;
         let mids = |life: &Life| showing.mid(&life.symbol, life.at);
-        let resting = before.rests() || after.rests();
-        if let (Some(was), Some(is), false) = (mids(before), mids(after), resting) {
+        let told = parts.price != Cash::ZERO && !before.rests() && !after.rests();
+        if let (Some(was), Some(is), true) = (mids(before), mids(after), told) {
             // The order was decided where the mid was another; what followed counts from there.
             let moved = after.side.sign() * (was - is) * after.underlying();
             let data = Cash::nearest(moved)?;

@@ -205,8 +205,8 @@ pub fn lives(log: &PaperLog) -> Result<Lives, MoneyError> {
     note(sideless, "fills of which neither side nor order is known are left out");
     note(feeless, "fills have no fee in the currency of their price, and count as free");
     notes.extend(log.findings.summaries().into_iter().filter(|found| found.kind.bears_on_comparison()).map(|found| {
-        let first = found.findings.first().map_or_else(String::new, |first| format!(" (first: {first})"));
-        format!("{} x {}{first}", found.count, found.says)
+        let first = found.findings.first().map_or_else(String::new, |first| format!("; the first: {first}"));
+        format!("{} ({}{first})", found.says, found.count)
     }));
     Ok(Lives { orders, notes })
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::market::paper::OrderWords;
 use crate::market::{
-    BacktestError, Cash, Condition, MoneyError, OrderId, OrderKind, Orders, Quantity, Session, Strategy, Ticket,
+    BacktestError, Cash, Condition, MoneyError, OrderId, OrderKind, Orders, Quantity, Rejection, Session, Strategy, Ticket,
     TimeInForce, View,
 };
 use crate::sim2real::Timestamp;
@@ -96,11 +96,18 @@ pub fn replay(mut session: Session<'_>, symbols: &[&str], orders: &[Life]) -> Re
         life.fees = life.fees.plus(fill.fee)?;
         life.pieces.push(Piece { at: fill.filled_at, quantity: fill.quantity, price: fill.price });
     }
-    let refused: Vec<String> = record.blotter.rejected.keys().map(|reason| reason.word().to_owned()).collect();
+    let refused = |order: &Life, ticket: &Ticket| {
+        let asked = |rejection: &&Rejection| {
+            let Rejection { decided_at, instrument, side, quantity, .. } = **rejection;
+            (decided_at, instrument, side, quantity) == (order.at, ticket.instrument, ticket.side, ticket.quantity)
+        };
+        let reason = record.blotter.rejections.iter().find(asked).map(|rejection| rejection.reason.word());
+        format!("the simulator refused it{}", reason.map_or_else(String::new, |reason| format!(" ({reason})")))
+    };
     let sent: HashSet<usize> = strategy.sent.values().copied().collect();
-    for (_, place, ..) in strategy.due.iter().filter(|due| lives[due.1].is_none()) {
+    for (_, place, ticket, _) in strategy.due.iter().filter(|due| lives[due.1].is_none()) {
         let why = if sent.contains(place) {
-            format!("the simulator refused it ({})", refused.join(", "))
+            refused(&orders[*place], ticket)
         } else {
             "decided outside the data of the run".to_owned()
         };
