@@ -14,7 +14,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("market", &["sim2real", "io", "report", "rl"]),
     ("robot", &["sim2real", "io", "report", "rl"]),
     ("strategies", &["sim2real", "market"]),
-    ("proof", &["sim2real", "conceal", "report", "robot"]),
+    ("proof", &["sim2real", "conceal", "report", "robot", "market"]),
     ("cli", &["sim2real", "conceal", "proof", "io", "report", "rl", "market", "robot", "strategies"]),
 ];
 

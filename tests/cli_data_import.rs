@@ -111,3 +111,57 @@ fn what_cannot_be_meant_is_refused_with_a_remedy() {
     insta::assert_snapshot!("refused", told);
     assert_eq!(scene.names(), ["ccxt_orders.json", "flex.xml", "symbols.toml"]);
 }
+
+const TAPE: &str = "ts,order_id,action,side,price,size\n\
+    1000000000,1,add,ask,101,1\n1000000000,2,add,ask,102,2\n1000000000,4,add,bid,99,9\n\
+    2000000000,9,add,bid,110,2.5\n2000000000,1,delete,ask,101,0\n2000000000,9,change,bid,110,1.5\n\
+    2000000000,2,change,ask,102,0.5\n2000000000,9,delete,bid,110,0\n3000000000,10,add,bid,102,0.5\n\
+    3500000000,7,delete,bid,98,0\n9000000000,11,add,bid,98,1\n";
+
+#[test]
+fn the_orders_of_a_tape_are_told_and_written_with_a_twin() {
+    let scene = Scene::new(&[]);
+    fs::write(scene.path("events.csv"), TAPE).unwrap();
+    let (code, told, err) = scene.run("--tape events.csv");
+    assert_eq!((code, err.as_str(), scene.names()), (0, "", vec!["events.csv".to_owned()]));
+    let (code, out, err) = scene.run("--tape events.csv --symbol XYZ --out tape");
+    assert_eq!((code, err.as_str()), (0, ""));
+    insta::assert_snapshot!("tape", format!("{told}\n{out}"));
+    let (code, out, err) = scene.run("--tape events.csv --out tape");
+    assert_eq!((code, out.as_str()), (2, ""));
+    assert!(err.contains("orders.parquet: the file exists already") && err.contains("--force"), "{err}");
+    let (code, json, _) = scene.run("--tape events.csv --out tape --force --json");
+    let findings: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((code, &findings["schema"], &findings["counts"]["orders"]), (0, &"trueup.tape_orders/1".into(), &1.into()));
+    assert_eq!((&findings["left_out"][0]["reason"], &findings["written"]), (&"not_executed".into(), &1.into()));
+    let (_, json, _) = scene.run("--tape events.csv --json");
+    let counted: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((&counted["counts"], counted.get("written")), (&findings["counts"], None), "nothing was written");
+}
+
+#[test]
+fn what_cannot_be_meant_of_a_tape_is_refused_with_a_remedy() {
+    let scene = Scene::new(&[]);
+    fs::write(scene.path("events.csv"), TAPE).unwrap();
+    fs::write(scene.path("nobody.csv"), TAPE.lines().take(4).collect::<Vec<_>>().join("\n")).unwrap();
+    let mut told = String::new();
+    for arguments in [
+        "--tape nobody.csv",
+        "--tape events.csv --min-size 100",
+        "--tape events.csv --min-size 0",
+        "--tape events.csv --levels 11",
+        "--tape events.csv --every 2 --at-most 5",
+        "--tape events.csv --every 0",
+        "--tape events.csv --apart soon",
+        "--tape events.csv --start 2020-01-01T00:00:00Z --end 2019-01-01T00:00:00Z",
+        "--tape events.csv --start yesterday",
+        "--tape events.csv --zone Europe/Berlin",
+        "events.csv --symbol XYZ",
+    ] {
+        let (code, out, err) = scene.run(&format!("{arguments} --out tape"));
+        assert_eq!((code, out.as_str()), (2, ""), "{arguments}");
+        told += &format!("$ trueup data import {arguments}\n{err}\n");
+    }
+    insta::assert_snapshot!("tape_refused", told);
+    assert_eq!(scene.names(), ["events.csv", "nobody.csv"]);
+}

@@ -1,5 +1,6 @@
 //! Impact that own orders meet again, simulated by other means than the laws': in small steps or by the sum over all that was
-//! traded, slice by slice. Concealed from the twin, it is to be named, with its constants.
+//! traded, slice by slice. Concealed from the twin, it is to be named, with its constants: from what later orders pay on a tape that
+//! does not know of them, or from what the mid of a tape does that shows them.
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 use std::sync::Arc;
@@ -38,7 +39,24 @@ enum Memory {
 struct Impact {
     bps: f64,
     memory: Memory,
+    /// Whether the tape shows it: orders then pay no more than what is quoted.
+    shown: bool,
+    /// What the mid does within a minute of a decision, in the direction of the order, whether or not anything is traded [bps].
+    foreseen: f64,
 }
+
+impl Impact {
+    fn unseen(bps: f64, memory: Memory) -> Self {
+        Self { bps, memory, shown: false, foreseen: 0.0 }
+    }
+
+    fn shown(bps: f64, memory: Memory) -> Self {
+        Self { shown: true, ..Self::unseen(bps, memory) }
+    }
+}
+
+/// The time over which what is foreseen comes true [s].
+const MINUTE: f64 = 60.0;
 
 /// Draws of a multiplicative congruential generator, from 0 to 1: Park & Miller, with the multiplier 48271.
 struct Draws(u64);
@@ -92,12 +110,26 @@ fn log(impact: Impact, seed: u64) -> Recording<OrderLog> {
     let (mut ticks, mut displaced, mut next) = (5_000_i64, 0.0_f64, 0);
     // What was displaced, and when [s]: for memories that are no equation of one state.
     let mut past: Vec<(f64, f64)> = Vec::new();
+    let (mut foreseen, mut shown) = (0.0, (0, 0));
     for step in 0..steps {
         let now = step as f64 * STEP;
         if step % 40 == 0 {
             ticks += [0, 0, 1, -1][(draws.uniform() * 4.0) as usize];
-            let price = |tick: i64| ticks as f64 * 0.01 + tick as f64 * 0.01;
+        }
+        if impact.foreseen != 0.0 {
+            let under_way = children.iter().filter(|c| (0.0..MINUTE).contains(&(now - c.step as f64 * STEP)));
+            foreseen += under_way.map(|child| child.sign * impact.foreseen * STEP / MINUTE).sum::<f64>();
+        }
+        // A mid of 50 moves a tick of 0.01 by 2 bps.
+        let moved = if impact.shown { foreseen + displaced } else { foreseen };
+        let quoted = (ticks + (moved / 2.0).round() as i64, step / 40);
+        if step == 0 || quoted != shown {
+            shown = quoted;
+            let price = |tick: i64| (quoted.0 + tick) as f64 * 0.01;
             quotes.push(at(step), &[Level { price: price(-1), size: 5e4 }], &[Level { price: price(1), size: 5e4 }]);
+        }
+        if let (Memory::Fades { lag, exponent }, true) = (impact.memory, impact.shown) {
+            displaced = past.iter().map(|(when, size)| size * (1.0 + (now - when) / lag).powf(-exponent)).sum();
         }
         match impact.memory {
             Memory::Gone => displaced = 0.0,
@@ -114,7 +146,8 @@ fn log(impact: Impact, seed: u64) -> Recording<OrderLog> {
                 displaced += own / SLICES as f64;
             }
             past.push((now, own));
-            let mid = ticks as f64 * 0.01;
+            let mid = shown.0 as f64 * 0.01;
+            let paid = if impact.shown { 0.0 } else { paid };
             let price = mid + child.sign * 0.01 + mid * (paid + NOISE * draws.bell()) * 1e-4;
             let id = format!("c{next}");
             let side = if child.sign > 0.0 { Side::Buy } else { Side::Sell };
@@ -139,7 +172,13 @@ fn log(impact: Impact, seed: u64) -> Recording<OrderLog> {
         daily_volatility: Some(0.02),
     };
     let tape = Arc::new(Tape::new(quotes, Vec::new(), Vec::new()));
-    OrderLog::recording("simulated", LogMarket { instrument, tape, price: PriceAssumption::Touch }, &orders, &fills).unwrap()
+    OrderLog::recording(
+        "simulated",
+        LogMarket { instrument, tape, price: PriceAssumption::Touch, shows_own_orders: None },
+        &orders,
+        &fills,
+    )
+    .unwrap()
 }
 
 fn diagnosed(impact: Impact, seed: u64) -> Diagnosis {
@@ -162,7 +201,7 @@ fn holds(diagnosis: &Diagnosis, parameter: &str, truth: f64, part: f64) {
 #[test]
 fn impact_that_decays_is_named_with_its_size_and_its_time() {
     for (seed, bps, recovery) in [(11, 4_000.0, 30.0), (12, 2_500.0, 120.0), (13, 6_000.0, 8.0)] {
-        let diagnosis = diagnosed(Impact { bps, memory: Memory::Decays(recovery) }, seed);
+        let diagnosis = diagnosed(Impact::unseen(bps, Memory::Decays(recovery)), seed);
         println!("{}", diagnosis.summary);
         assert_eq!((names(&diagnosis), diagnosis.verdict), (vec!["transient_impact"], Verdict::Named), "{diagnosis:#?}");
         holds(&diagnosis, "bps_at_full_participation", bps, 0.12);
@@ -172,7 +211,7 @@ fn impact_that_decays_is_named_with_its_size_and_its_time() {
 
 #[test]
 fn impact_that_fades_as_a_power_is_named_and_stated_as_one() {
-    let diagnosis = diagnosed(Impact { bps: 6_000.0, memory: Memory::Fades { lag: 4.0, exponent: 0.5 } }, 21);
+    let diagnosis = diagnosed(Impact::unseen(6_000.0, Memory::Fades { lag: 4.0, exponent: 0.5 }), 21);
     println!("{}", diagnosis.summary);
     assert_eq!((names(&diagnosis), diagnosis.verdict), (vec!["transient_impact"], Verdict::Named), "{diagnosis:#?}");
     holds(&diagnosis, "bps_at_full_participation", 6_000.0, 0.2);
@@ -181,11 +220,11 @@ fn impact_that_fades_as_a_power_is_named_and_stated_as_one() {
 
 #[test]
 fn what_stays_and_what_is_gone_at_once_are_not_called_transient() {
-    let stays = diagnosed(Impact { bps: 3_000.0, memory: Memory::Stays }, 31);
+    let stays = diagnosed(Impact::unseen(3_000.0, Memory::Stays), 31);
     println!("{}", stays.summary);
     assert_eq!(names(&stays), ["permanent_impact"], "{stays:#?}");
     holds(&stays, "bps_at_full_participation", 3_000.0, 0.12);
-    let gone = diagnosed(Impact { bps: 5_000.0, memory: Memory::Gone }, 32);
+    let gone = diagnosed(Impact::unseen(5_000.0, Memory::Gone), 32);
     println!("{}", gone.summary);
     assert_eq!(names(&gone), ["linear_impact"], "{gone:#?}");
     // An order pays half of what it moves.
@@ -195,7 +234,42 @@ fn what_stays_and_what_is_gone_at_once_are_not_called_transient() {
 #[test]
 fn where_own_orders_move_nothing_no_impact_is_named() {
     for seed in [41, 42] {
-        let nothing = diagnosed(Impact { bps: 0.0, memory: Memory::Gone }, seed);
+        let nothing = diagnosed(Impact::unseen(0.0, Memory::Gone), seed);
         assert_eq!((names(&nothing), nothing.verdict), (vec![], Verdict::NoMismatch), "{}", nothing.summary);
     }
+}
+
+#[test]
+fn impact_that_the_tape_shows_is_named_from_its_mids_and_costs_nothing_besides() {
+    for (seed, memory, name) in [
+        (51, Memory::Decays(30.0), "transient_impact"),
+        (52, Memory::Stays, "permanent_impact"),
+        (53, Memory::Fades { lag: 4.0, exponent: 0.5 }, "transient_impact"),
+    ] {
+        let diagnosis = diagnosed(Impact::shown(4_000.0, memory), seed);
+        println!("{}", diagnosis.summary);
+        assert_eq!((names(&diagnosis), diagnosis.verdict), (vec![name], Verdict::Named), "{diagnosis:#?}");
+        assert!(diagnosis.effects[0].parameters["paid"].value == 0.0);
+        holds(&diagnosis, "bps_at_full_participation", 4_000.0, 0.2);
+        if let Memory::Decays(recovery) = memory {
+            holds(&diagnosis, "recovery", recovery, 0.3);
+        }
+        let mid = diagnosis.fit.iter().find(|fit| fit.channel == "mid").unwrap();
+        assert!(mid.improvement_ci95[0] > 0.0, "{mid:?}");
+    }
+}
+
+#[test]
+fn what_orders_foresaw_is_no_impact() {
+    for (seed, foreseen) in [(61, 4.0), (62, -4.0), (63, 10.0)] {
+        let nothing = Impact { foreseen, ..Impact::shown(0.0, Memory::Gone) };
+        let diagnosis = diagnosed(nothing, seed);
+        assert_eq!((names(&diagnosis), diagnosis.verdict), (vec![], Verdict::NoMismatch), "{}", diagnosis.summary);
+    }
+    let both = Impact { foreseen: 6.0, ..Impact::shown(4_000.0, Memory::Stays) };
+    let diagnosis = diagnosed(both, 64);
+    assert_eq!(names(&diagnosis), ["permanent_impact"], "{}", diagnosis.summary);
+    let bps = diagnosis.effects[0].parameters["bps_at_full_participation"].value;
+    // A part of what is foreseen comes between a decision and the look after its fill.
+    assert!((bps / 4_000.0 - 1.0).abs() < 0.1, "{bps}");
 }

@@ -92,7 +92,7 @@ fn a_twin_reads_back_as_it_was_rendered_and_still_finds_its_files() {
     for name in ["joint.toml", "market.toml"] {
         let twin = TwinFile::read(scene.path(name)).unwrap();
         let out = scene.path("out/deep");
-        let text = twin.render(&out);
+        let text = twin.render(&out).unwrap();
         fs::create_dir_all(&out).unwrap();
         fs::write(out.join(name), &text).unwrap();
         let back = TwinFile::read(out.join(name)).unwrap();
@@ -100,7 +100,7 @@ fn a_twin_reads_back_as_it_was_rendered_and_still_finds_its_files() {
         assert_eq!((&back.mechanisms, &back.instruments), (&twin.mechanisms, &twin.instruments));
         assert_eq!(back.assumptions, twin.assumptions);
         assert_eq!(back.market.as_ref().map(|m| &m.format), twin.market.as_ref().map(|m| &m.format));
-        assert_eq!(back.render(&out), text);
+        assert_eq!(back.render(&out).unwrap(), text);
         assert!(!text.contains(&scene.0.path().display().to_string()), "{text}");
     }
     fs::remove_file(scene.path("bars.csv")).unwrap();

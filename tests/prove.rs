@@ -95,12 +95,51 @@ fn a_run_that_was_cut_short_goes_on_to_the_same_end() {
     assert!(code == 2 && err.contains("case 0: the label is not the one that was sealed"), "{err}");
 }
 
+/// Markets are sealed, diagnosed and taken up again as joints are, and what is kept is what a user would bring.
+#[test]
+fn a_benchmark_of_markets_goes_on_to_the_same_end_and_keeps_what_a_user_would_bring() {
+    let root = TempDir::new().unwrap();
+    let folder = root.path();
+    let (code, out, err) = trueup(folder, "prove --domain market --cases 2 --seed 1 --out whole --keep");
+    assert!(code == 0 && out.contains("stays or fades") && out.contains("mids alone"), "{out}{err}");
+    let lines = timeless(&folder.join("whole/cases.jsonl"));
+    assert_eq!((lines.len(), lines[0]["domain"].as_str()), (3, Some("market")));
+
+    // The same log from files as from memory: what is said of it is the same to the last digit.
+    let kept = folder.join("whole/cases/000");
+    let (code, out, err) = trueup(&kept, "diagnose twin.toml --recording train --holdout test --json");
+    assert_eq!(code, 0, "{err}");
+    let said: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(said["verdict"], lines[1]["trial"]["verdict"]);
+    let names = |effects: &Value, key: &str| -> Vec<String> {
+        effects.as_array().unwrap().iter().map(|effect| effect[key].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(names(&said["effects"], "mechanism"), names(&lines[1]["trial"]["found"], "mechanism"));
+    let cost = said["fit"].as_array().unwrap().iter().find(|fit| fit["channel"] == "cost").unwrap();
+    assert_eq!(cost["trued_rmse"], lines[1]["trial"]["held_out"]["trued"]);
+    let label = fs::read_to_string(kept.join("label.json")).unwrap();
+    assert_eq!(label.trim_end(), lines[1]["label"].as_str().unwrap());
+    let twin = fs::read_to_string(kept.join("twin.toml")).unwrap();
+    assert!(!twin.contains("mechanism") && !twin.contains("live") && !twin.contains("paper"), "twins do not tell: {twin}");
+
+    // A run of joints is not taken up as one of markets.
+    let text = fs::read_to_string(folder.join("whole/cases.jsonl")).unwrap();
+    let last = text.trim_end().rfind('\n').unwrap() + 1;
+    fs::create_dir(folder.join("cut")).unwrap();
+    fs::write(folder.join("cut/cases.jsonl"), &text[..last + 200]).unwrap();
+    let (code, _, err) = trueup(folder, "prove --domain robot --cases 2 --seed 1 --out cut --resume");
+    assert!(code == 2 && err.contains("holds cases of another domain: market"), "{err}");
+    let (code, out, err) = trueup(folder, "prove --domain market --cases 2 --seed 1 --out cut --resume --threads 1");
+    assert!(code == 0 && out.contains("1 of them diagnosed already"), "{out}{err}");
+    assert_eq!(timeless(&folder.join("cut/cases.jsonl")), lines);
+}
+
 #[test]
 fn what_cannot_be_proved_is_said() {
     let root = TempDir::new().unwrap();
-    let (code, out, err) = trueup(root.path(), "prove --domain market");
+    let (code, out, err) = trueup(root.path(), "prove --domain weather");
     assert_eq!((code, out.as_str()), (2, ""));
-    assert!(err.contains("not built yet") && err.contains("hint: --domain robot"), "{err}");
+    assert!(err.contains("weather") && err.contains("market"), "{err}");
     let (code, _, err) = trueup(root.path(), "prove --cases 0");
     assert!(code == 2 && err.contains("--cases"), "{err}");
     let (code, _, err) = trueup(root.path(), "prove --resume --force");

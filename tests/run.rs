@@ -50,6 +50,7 @@ fn output(table: &trueup::conceal::Table) -> OutputTable {
             Column::Whole(values) => Values::Integers(values.iter().copied().map(Some).collect()),
             Column::Real(values) => Values::Floats(values.iter().copied().map(Some).collect()),
             Column::Text(values) => Values::Texts(values.iter().cloned().map(Some).collect()),
+            Column::Sparse(values) => Values::Floats(values.clone()),
             Column::Empty(rows) => Values::Floats(vec![None; *rows]),
         };
         out.with(name, values)

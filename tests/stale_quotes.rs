@@ -106,7 +106,7 @@ fn log(parts: &[(&str, &str, f64)], seen: fn(f64) -> Option<f64>) -> Recording<O
     let orders: Vec<LoggedOrder> = record.blotter.orders.iter().map(logged).collect();
     let fills: Vec<LoggedFill> = record.blotter.fills.iter().map(filled).collect();
     let tape = Arc::new(Tape::new(history.quotes().clone(), Vec::new(), Vec::new()));
-    let market = LogMarket { instrument: instrument("A"), tape, price: PriceAssumption::Touch };
+    let market = LogMarket { instrument: instrument("A"), tape, price: PriceAssumption::Touch, shows_own_orders: None };
     OrderLog::recording("own run", market, &orders, &fills).unwrap()
 }
 

@@ -20,6 +20,7 @@ mod run;
 mod scene;
 mod stream;
 mod table;
+mod tape_orders;
 mod trajectory;
 mod twin;
 mod unit;
@@ -35,7 +36,7 @@ use scene::Scene;
 type Target = (&'static str, fn(&Scene, &[u8]));
 
 /// The targets, by their names, which are those of their folders in `fuzz/seeds`.
-const TARGETS: [Target; 22] = [
+const TARGETS: [Target; 23] = [
     ("account", account::target),
     ("arrow", columnar::arrow),
     ("chunks", stream::chunks),
@@ -55,6 +56,7 @@ const TARGETS: [Target; 22] = [
     ("run", run::target),
     ("stream", stream::target),
     ("tape", history::tape),
+    ("tape_orders", tape_orders::target),
     ("trajectory", trajectory::target),
     ("twin", twin::target),
     ("unit", unit::target),

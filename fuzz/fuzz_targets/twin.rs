@@ -22,7 +22,7 @@ pub fn target(scene: &Scene, bytes: &[u8]) {
         "equations" => drop(shown(equations_assembly(&twin, &[]))),
         _ => drop(shown(execution_assembly(&twin))),
     }
-    let text = twin.render(&scene.path("out"));
+    let text = twin.render(&scene.path("out")).expect("a twin that was read can be written");
     let again = TwinFile::read(scene.write("out/twin.toml", text.as_bytes())).expect("what was written can be read");
     assert_eq!((&again.model, again.step), (&twin.model, twin.step));
     assert_eq!((&again.parameters, &again.channels), (&twin.parameters, &twin.channels));
@@ -36,5 +36,5 @@ fn real(market: &Option<MarketFiles>) -> Option<MarketFiles> {
     let real = |path: &Option<PathBuf>| path.as_ref().map(|path| path.canonicalize().expect("a file that is there"));
     let market = market.as_ref().filter(|market| **market != MarketFiles::default())?;
     let [quotes, trades, bars] = [&market.quotes, &market.trades, &market.bars].map(real);
-    Some(MarketFiles { quotes, trades, bars, format: market.format.clone() })
+    Some(MarketFiles { quotes, trades, bars, shows_own_orders: market.shows_own_orders, format: market.format.clone() })
 }

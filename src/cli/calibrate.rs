@@ -25,7 +25,7 @@ Examples:
   trueup calibrate twin.toml --recording train.csv --holdout test.csv --out calibrated.toml
   trueup calibrate twin.toml --recording train.csv --json")]
 pub(super) struct Calibrate {
-    /// TOML file of the twin
+    /// TOML file of the twin, or of a run
     twin: PathBuf,
     /// Recordings to fit
     #[arg(long, value_name = "PATH", required = true, num_args = 1..)]
@@ -86,7 +86,7 @@ impl Calibrate {
                 let folder = path.parent().unwrap_or(Path::new(""));
                 let name = self.twin.file_name().unwrap_or_default().to_string_lossy().replace(char::is_control, " ");
                 let head = format!("# Made by `trueup calibrate` from {name}.\n");
-                write_file(path, (head + &twin.document(&file).render(folder)).as_bytes(), overwrite)?;
+                write_file(path, (head + &twin.document(&file)?.render(folder)?).as_bytes(), overwrite)?;
                 if !self.json {
                     text += &format!("\nWritten: {}\n", path.display());
                 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::io::{InputError, TwinFile, hint_among};
-use crate::market::execution_twin;
+use crate::market::{LogReader, check_needs, execution_assembly};
 use crate::robot::{
     cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
     tanks_assembly, tanks_recordings,
@@ -77,11 +77,13 @@ impl Case {
                 Box::new(Given { twin: assembly, recordings, held_out: equations_recordings(twin, held_out)? })
             }
             "execution" => {
-                // Read together, so that the tape is read once.
-                let paths: Vec<PathBuf> = recordings.iter().chain(held_out).cloned().collect();
-                let (assembly, mut all) = execution_twin(twin, &paths)?;
-                let held_out = all.split_off(recordings.len());
-                Box::new(Given { twin: assembly, recordings: all, held_out })
+                let assembly = execution_assembly(twin)?;
+                // By one reader, so that the tape is read once.
+                let mut reader = LogReader::of(twin)?;
+                let (recordings, held_out) = (reader.read_all(recordings)?, reader.read_all(held_out)?);
+                check_needs(twin, &recordings)?;
+                check_needs(twin, &held_out)?;
+                Box::new(Given { twin: assembly, recordings, held_out })
             }
             other => {
                 let error = twin.error(&["twin", "model"], format!("there is no model `{other}`"));

@@ -1,6 +1,7 @@
-//! `trueup data`: the data sets that come with the project, and logs that come from elsewhere.
+//! `trueup data`: the data sets that come with the project, logs that come from elsewhere, and orders out of tapes.
 
 mod import;
+mod tape;
 mod told;
 
 use std::path::{Path, PathBuf};
@@ -24,7 +25,7 @@ pub(super) struct Data {
 #[derive(Debug, Subcommand)]
 enum DataCommand {
     Make(Make),
-    Import(import::Import),
+    Import(Box<import::Import>),
 }
 
 /// Write the generated data sets: a servo recording, a day of orders and a month of minute bars
@@ -98,6 +99,7 @@ fn values(column: &Column, typed_times: bool) -> Values {
         Column::Time(whole) | Column::Whole(whole) => Values::Integers(whole.iter().copied().map(Some).collect()),
         Column::Real(real) => Values::Floats(real.iter().copied().map(Some).collect()),
         Column::Text(texts) => Values::Texts(texts.iter().cloned().map(Some).collect()),
+        Column::Sparse(real) => Values::Floats(real.clone()),
         Column::Empty(rows) => Values::Floats(vec![None; *rows]),
     }
 }

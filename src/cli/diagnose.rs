@@ -27,13 +27,15 @@ pub(super) use told::{effect_names, errors, headline};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A recording of a joint is a file (CSV, Parquet or Arrow; t in s), one of execution a folder with orders and fills.
+A RUN.toml is a twin of execution: its trued.toml is that run with what was found added.
 
 Examples:
   trueup diagnose twin.toml --recording train.csv --holdout test.csv --out diagnosis
   trueup diagnose twin.toml --recording monday tuesday --json > diagnosis.json
+  trueup diagnose run.toml --recording logs/paper --out told && trueup backtest told/trued.toml
   trueup diagnose twin.toml --recording run.parquet --fail-on mismatch    # exit code 1 if the twin is incomplete")]
 pub(super) struct Diagnose {
-    /// TOML file of the twin: its model, its parameters, and what it models already
+    /// TOML file of the twin: its model, its parameters, and what it models already; or of a run
     twin: PathBuf,
     /// Recordings to fit
     #[arg(long, value_name = "PATH", required = true, num_args = 1..)]
@@ -140,7 +142,7 @@ pub(super) fn write(
     let trued = format!(
         "# Made by `trueup diagnose` from {name}. {}: {summary}\n{}",
         diagnosis.verdict,
-        diagnosed.trued.document(file).render(folder)
+        diagnosed.trued.document(file)?.render(folder)?
     );
     let mut output = OutputFolder::create(folder, overwrite)?;
     for (name, text) in FILES.iter().zip([Some(json(diagnosis)?), Some(trued), Some(page), experiment]) {

@@ -1,6 +1,7 @@
 //! A twin after a fit: its parameters with the values the recordings gave them, and the document that says so.
 
-use crate::io::{MechanismEntry, Quantity, TwinFile};
+use crate::io::{InputError, MechanismEntry, Quantity, TwinFile};
+use crate::market::settle_trued_run;
 use crate::sim2real::{Assembly, Parameter, Plant, Simulator};
 
 /// The parameters of a twin after a fit.
@@ -61,7 +62,10 @@ impl FittedTwin {
     ///
     /// A commission that was an assumption of the file and has been refitted becomes a mechanism, for assumptions have no
     /// uncertainty.
-    pub fn document(&self, file: &TwinFile) -> TwinFile {
+    ///
+    /// # Errors
+    /// What [`settle_trued_run`] refuses, where the file is a run.
+    pub fn document(&self, file: &TwinFile) -> Result<TwinFile, InputError> {
         let mut out = file.clone();
         for fitted in self.own.iter().filter(|fitted| !fitted.frozen) {
             let controller = out.controller.as_mut().zip(fitted.name.strip_prefix("controller."));
@@ -73,7 +77,8 @@ impl FittedTwin {
             }
         }
         let entry = |(id, all): &(&'static str, Vec<Fitted>)| {
-            let before = file.mechanisms.iter().find(|entry| entry.name == *id);
+            let brought = file.run.iter().filter_map(|run| run.twin.as_ref()).flat_map(|twin| &twin.mechanisms);
+            let before = file.mechanisms.iter().chain(brought).find(|entry| entry.name == *id);
             let quantity = |fitted: &Fitted| {
                 let kept = before.and_then(|entry| entry.parameter(&fitted.name)).filter(|_| fitted.frozen);
                 (fitted.name.clone(), kept.cloned().unwrap_or_else(|| fitted.quantity()))
@@ -87,9 +92,23 @@ impl FittedTwin {
             assumptions.commission_bps = None;
             assumptions.commission_per_share = None;
         }
-        out
+        // What was seen to move the mid of a tape is in that tape: nothing else is to be added to it.
+        if self.mechanisms.iter().any(|(_, all)| all.iter().any(|fitted| fitted.name == SHOWN)) {
+            match &mut out.run {
+                Some(run) => run.run.shows_own_orders = run.run.shows_own_orders.or(Some(true)),
+                None => {
+                    let market = out.market.get_or_insert_default();
+                    market.shows_own_orders = market.shows_own_orders.or(Some(true));
+                }
+            }
+        }
+        settle_trued_run(&mut out)?;
+        Ok(out)
     }
 }
+
+/// The parameter that laws have where a tape shows own orders.
+const SHOWN: &str = "paid";
 
 impl Fitted {
     /// The fitted value as a document gives it.
@@ -118,7 +137,7 @@ mod tests {
     }
 
     fn read_back(file: &TwinFile) -> TwinFile {
-        TwinFile::parse(Document::from_text("trued.toml", file.render(Path::new("")))).unwrap()
+        TwinFile::parse(Document::from_text("trued.toml", file.render(Path::new("")).unwrap())).unwrap()
     }
 
     #[test]
@@ -131,7 +150,7 @@ mod tests {
         let values = [96.0, 210.0, 0.0, 1.0, 21.0, 50.0];
         let fitted = FittedTwin::of(&assembly, &values, &[0.5, 2.0, 0.0, 0.0, 0.1, 0.0]);
         assert_eq!(fitted.named()[4].0, "coulomb_friction.torque");
-        let back = read_back(&fitted.document(&file));
+        let back = read_back(&fitted.document(&file).unwrap());
         let again = joint_assembly(&back).unwrap();
         assert_eq!(again.parameters().iter().map(|p| p.nominal).collect::<Vec<_>>(), values);
         assert_eq!(back.parameters["inertia"], Quantity::with_std(96.0, 0.5, "kg"));
@@ -146,7 +165,7 @@ mod tests {
                     [[instrument]]\nsymbol = \"XYZ\"\ntick_size = 0.01\n";
         let file = TwinFile::parse(Document::from_text("twin.toml", text)).unwrap();
         let fitted = FittedTwin::of(&execution_assembly(&file).unwrap(), &[0.41], &[0.0]);
-        let back = read_back(&fitted.document(&file));
+        let back = read_back(&fitted.document(&file).unwrap());
         let again = execution_assembly(&back).unwrap();
         assert_eq!((again.parameters().len(), again.parameters()[0].nominal), (1, 0.41));
         assert!(!again.parameters()[0].frozen());

@@ -27,6 +27,21 @@ pub(super) struct LogArguments {
 }
 
 impl LogArguments {
+    /// Refuses what says something of a log, where there is none.
+    pub fn check_unused(&self) -> Result<(), InputError> {
+        let given = [
+            ("--format", self.format.is_some()),
+            ("--symbols", self.symbols.is_some()),
+            ("--zone", self.zone.is_some()),
+            ("--fee-rate", !self.rates.is_empty()),
+        ];
+        match given.iter().find(|(_, given)| *given) {
+            None => Ok(()),
+            Some((name, _)) => Err(InputError::new(*name, "says how a log is read, and means nothing to a tape")
+                .hint("leave it out: what a tape is, its columns say")),
+        }
+    }
+
     pub fn settings(&self) -> Result<ImportSettings, InputError> {
         let mut rates = FeeRates::default();
         for rate in &self.rates {

@@ -7,26 +7,27 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use rayon::prelude::*;
 
-use crate::conceal::benchmark::{Case, draw};
-use crate::io::{InputError, OutputFolder, Overwrite};
+use crate::io::{OutputFolder, Overwrite};
 use crate::proof::{
-    Header, JOURNAL, Line, Sealed, Standing, Summary, TEST_SEEDS, Trial, figures_table, readme, seal_of_all, tried,
+    Domain as Concealing, Header, JOURNAL, Line, Sealed, Standing, Summary, TEST_SEEDS, Trial, figures_table, readme,
+    seal_of_all,
 };
 use crate::sim2real::Seed;
 
 use super::screen::{Progress, Screen, titled};
 use super::stop::{Outcome, Stop};
 
+mod cases;
 mod kept;
 mod record;
 
+use cases::Cases;
 use record::{Record, Start};
 
 /// Conceal effects, diagnose blind, unseal and score: how often a diagnosis is right
 ///
-/// Draws cases, each a joint with something concealed in it or with nothing, seals their labels by SHA-256, diagnoses them,
+/// Draws cases, each a joint or two days of orders with something concealed in them or with nothing, seals their labels by SHA-256, diagnoses them,
 /// and only then unseals and scores them, beside recalibration alone, sparse regression, and a fit that is told the names.
 ///
 /// Seeds below 1000 are for development; those from 1000 on are for tests, of whose cases nothing is to be learnt. A case is
@@ -67,8 +68,19 @@ pub(super) struct Prove {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Domain {
+    /// Joints of every kind
     Robot,
+    /// Days of orders
     Market,
+}
+
+impl From<Domain> for Concealing {
+    fn from(domain: Domain) -> Self {
+        match domain {
+            Domain::Robot => Self::Robot,
+            Domain::Market => Self::Market,
+        }
+    }
 }
 
 /// The files that appear at the end.
@@ -76,10 +88,6 @@ const FILES: [&str; 4] = ["summary.json", "figures.md", "README.md", "report.htm
 
 impl Prove {
     pub fn run(self, screen: &Screen) -> Result<Outcome, Stop> {
-        if self.domain == Domain::Market {
-            let error = InputError::new("--domain", "the blind benchmark of markets is not built yet");
-            return Err(error.found_text("market").hint("--domain robot is").into());
-        }
         let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
         // Before the work rather than after it.
         let mut output = OutputFolder::create(&self.out, overwrite)?;
@@ -88,13 +96,11 @@ impl Prove {
         let start = if self.resume { Start::Resume } else { Start::Anew(overwrite) };
         record::check(&path, start)?;
 
-        let cases = self.drawn(&screen.progress());
-        let seed = Seed(self.seed);
-        let sealed: Vec<Sealed> =
-            cases.iter().map(|case| Sealed::new(&case.label, seed)).collect::<Result<_, serde_json::Error>>()?;
+        let domain = Concealing::from(self.domain);
+        let (cases, sealed) = Cases::draw(domain, Seed(self.seed), self.cases as usize, &screen.progress())?;
         let header = Header {
             schema: JOURNAL.to_owned(),
-            domain: "robot".to_owned(),
+            domain,
             seed: self.seed,
             cases: cases.len(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -113,7 +119,7 @@ impl Prove {
         output.file("README.md", readme(&summary).as_bytes())?;
         output.file("report.html", summary.page()?.as_bytes())?;
         if self.keep {
-            kept::write(&cases, &sealed, &self.out.join("cases"), overwrite)?;
+            kept::write(&cases, &sealed, &self.out.join("cases"), overwrite, &screen.progress())?;
         }
         let paths = output.finish()?;
         let mut text = if self.json { json } else { told(screen, &summary) };
@@ -123,25 +129,13 @@ impl Prove {
         screen.print(&text)?;
         Ok(Outcome::Done)
     }
-
-    /// All cases: their labels must be sealed before the first is diagnosed.
-    fn drawn(&self, progress: &Progress) -> Vec<Case> {
-        let (done, count) = (AtomicUsize::new(0), self.cases as usize);
-        progress.tell("drawing cases", 0, count);
-        let one = |index: usize| {
-            let case = draw(Seed(self.seed), index);
-            progress.tell("drawing cases", done.fetch_add(1, Ordering::Relaxed) + 1, count);
-            case
-        };
-        (0..count).into_par_iter().map(one).collect()
-    }
 }
 
 /// Diagnoses what `record` does not hold yet. Cases are begun in order and written in order.
 ///
 /// Each thread of the pool works on a case of its own: were the cases tasks of one parallel loop, a diagnosis that waits for
 /// a part of its own might be given another case to do meanwhile, and its time would be that of both.
-fn diagnosed(cases: &[Case], sealed: &[Sealed], record: &Record, progress: &Progress) -> Result<(), Stop> {
+fn diagnosed(cases: &Cases, sealed: &[Sealed], record: &Record, progress: &Progress) -> Result<(), Stop> {
     let clock = Instant::now();
     let next = AtomicUsize::new(record.done());
     let waiting = Mutex::new(Waiting { next: record.done(), done: BTreeMap::new(), failed: None });
@@ -149,10 +143,15 @@ fn diagnosed(cases: &[Case], sealed: &[Sealed], record: &Record, progress: &Prog
     let work = || {
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(case) = cases.get(index) else { return };
-            let trial = tried(case, &|| clock.elapsed().as_secs_f64());
+            if index >= cases.len() {
+                return;
+            }
+            let trial = cases.get(index).tried(&|| clock.elapsed().as_secs_f64());
             let Ok(mut waiting) = waiting.lock() else { return };
-            waiting.done.insert(index, trial);
+            match trial {
+                Ok(trial) => drop(waiting.done.insert(index, trial)),
+                Err(error) => waiting.failed = Some(Stop::Bug(format!("case {index} cannot be read: {error}"))),
+            }
             waiting.write(sealed, record);
             progress.tell("diagnosing", waiting.next, cases.len());
             if waiting.failed.is_some() {

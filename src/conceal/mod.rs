@@ -7,9 +7,14 @@
 pub mod bars;
 pub mod benchmark;
 mod catalogue;
+mod concealed;
 pub mod exchange;
+mod kind;
 pub mod servo;
 mod table;
+pub mod trading;
 
 pub use catalogue::{Content, Set, catalogue};
+pub use concealed::{Concealed, Span};
+pub use kind::{Kind, MIX, Null};
 pub use table::{Column, Table};

@@ -11,6 +11,8 @@ pub enum Column {
     Real(Vec<f64>),
     /// Words.
     Text(Vec<String>),
+    /// Real numbers, some of which are not there.
+    Sparse(Vec<Option<f64>>),
     /// As many rows as given, none with a value.
     Empty(usize),
 }
@@ -23,6 +25,7 @@ impl Column {
             Self::Time(values) | Self::Whole(values) => values.len(),
             Self::Real(values) => values.len(),
             Self::Text(values) => values.len(),
+            Self::Sparse(values) => values.len(),
             Self::Empty(rows) => *rows,
         }
     }
@@ -88,6 +91,7 @@ impl Table {
                 Column::Time(values) | Column::Whole(values) => values.iter().for_each(|v| hash.update(v.to_le_bytes())),
                 Column::Real(values) => values.iter().for_each(|v| hash.update(v.to_bits().to_le_bytes())),
                 Column::Text(values) => values.iter().for_each(|v| hash.update(v.as_bytes())),
+                Column::Sparse(values) => values.iter().flatten().for_each(|v| hash.update(v.to_bits().to_le_bytes())),
                 Column::Empty(rows) => hash.update(rows.to_le_bytes()),
             }
         }

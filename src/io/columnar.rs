@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use chrono::{DateTime, NaiveDateTime};
 use polars::prelude::{
-    ArrowDataType, ArrowSchema, DataFrame, DataType, FileMetadata, IpcReader, ParquetReader, PolarsResult, SerReader,
-    Series, TimeUnit as PolarsUnit, TimeZone, polars_ensure,
+    ArrowDataType, ArrowSchema, DataFrame, DataType, FileMetadata, IdxSize, IpcReader, ParquetReader, PolarsResult,
+    SerReader, Series, TimeUnit as PolarsUnit, TimeZone, polars_ensure,
 };
 
 use super::arrow_buffers::buffers_agree;
@@ -68,13 +68,14 @@ impl ColumnarFile {
         self.frame.height()
     }
 
-    /// The values of the column of that name, which the file must have.
-    pub(super) fn column(&self, name: &str) -> Column {
+    /// The values of the column of that name, which the file must have, in all of its rows or in those `only`.
+    pub(super) fn column(&self, name: &str, only: Option<&[IdxSize]>) -> Column {
         if let Some((_, kind)) = self.left_out.iter().find(|(left_out, _)| left_out == name) {
             return Column::Other(kind.clone());
         }
         let series = self.frame.column(name).map(|column| column.as_materialized_series());
-        match series.and_then(values) {
+        let of_rows = series.and_then(|series| only.map_or(Ok(series.clone()), |only| series.take_slice(only)));
+        match of_rows.and_then(|series| values(&series)) {
             Ok(column) => column,
             Err(error) => Column::Other(first_line(&error.to_string())),
         }

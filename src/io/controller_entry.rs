@@ -5,7 +5,7 @@ use serde::Deserialize;
 use super::document::Document;
 use super::error::InputError;
 use super::quantity::{Exactly, Quantity};
-use super::twin_file::{exact_form, float, section, text};
+use super::toml_text::{exact_form, float, section, text};
 use crate::sim2real::DerivativeOf;
 
 /// `[controller]`: numbers without an uncertainty are known exactly, for a controller is what somebody has set.

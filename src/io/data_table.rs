@@ -1,5 +1,6 @@
 //! `[[data]]` of RUN.toml: a file of market data, and how it is written and held to what it can be.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use chrono_tz::Tz;
@@ -8,15 +9,96 @@ use serde::{Deserialize, Deserializer};
 
 use super::document::{Document, HINT};
 use super::error::{InputError, hint_among, listed};
-use super::feed_format::{FeedFormat, zone};
+use super::feed_format::{FeedFormat, check_file, zone};
 use super::feed_rules::{ClockOffset, FeedClock, FeedRules, OnBad, clock_offset, span};
 use super::instrument_entry::InstrumentEntry;
 use super::layout::Layout;
-use super::run_file::{DataEntry, FeedKind};
 use super::stamp::Stamp;
 use super::table::Renames;
 use super::time_format::TimeUnit;
 use crate::sim2real::Timestamp;
+
+/// What a data file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FeedKind {
+    /// Bars: open, high, low, close and volume of an interval.
+    Bars,
+    /// Quotes: best bid and ask, and deeper levels.
+    Quotes,
+    /// Trades.
+    Trades,
+    /// Changes of an order book.
+    Book,
+    /// Dividends and splits.
+    Actions,
+}
+
+impl FeedKind {
+    /// The word for it in documents.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Bars => "bars",
+            Self::Quotes => "quotes",
+            Self::Trades => "trades",
+            Self::Book => "book",
+            Self::Actions => "actions",
+        }
+    }
+}
+
+/// `[[data]]`: a file of market data of one instrument.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DataEntry {
+    /// Symbol of the instrument.
+    pub symbol: String,
+    /// What the file holds.
+    pub kind: FeedKind,
+    /// The file.
+    pub path: PathBuf,
+    /// The file, as the document names it.
+    pub named: String,
+    /// How it is written.
+    pub format: FeedFormat,
+    /// Length of a bar [ns]; none where the distances between bars show it.
+    pub interval: Option<i64>,
+}
+
+impl DataEntry {
+    /// Holds its files, which stand in the `number`-th section of `document`, to exist.
+    pub(super) fn check_files(&self, document: &Document, number: &str) -> Result<(), InputError> {
+        check_file(document, &["data", number, self.kind.word()], &self.path.to_string_lossy())?;
+        match &self.format.snapshot {
+            Some(snapshot) => check_file(document, &["data", number, "snapshot"], &snapshot.to_string_lossy()),
+            None => Ok(()),
+        }
+    }
+
+    /// The same with paths that start from where the program runs.
+    pub(super) fn resolved(self, document: &Document) -> Self {
+        let snapshot = self.format.snapshot.as_ref().map(|path| document.resolve(path));
+        Self { path: document.resolve(&self.path), format: FeedFormat { snapshot, ..self.format }, ..self }
+    }
+}
+
+/// The entries of a document's sections, none of them of the same data of one instrument; there should be data up to `end`.
+pub(super) fn data_entries(
+    document: &Document,
+    tables: Vec<DataTable>,
+    instruments: &[InstrumentEntry],
+    end: Option<Timestamp>,
+) -> Result<Vec<DataEntry>, InputError> {
+    let entry = |(index, table): (usize, DataTable)| data_entry(document, &index.to_string(), table, instruments, end);
+    let data = tables.into_iter().enumerate().map(entry).collect::<Result<Vec<_>, _>>()?;
+    let mut seen = BTreeSet::new();
+    match data.iter().position(|d| !seen.insert((d.symbol.clone(), d.kind))) {
+        None => Ok(data),
+        Some(index) => {
+            let message = format!("there are {} of `{}` already", data[index].kind.word(), data[index].symbol);
+            Err(document.error(&["data", &index.to_string()], message).hint("join the files into one"))
+        }
+    }
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -50,8 +132,8 @@ pub(super) struct DataTable {
     max_gap: Option<i64>,
 }
 
-/// The entry of a section; there should be data up to `end`.
-pub(super) fn data_entry(
+/// The entry of a section.
+fn data_entry(
     document: &Document,
     number: &str,
     mut table: DataTable,

@@ -68,6 +68,21 @@ impl Document {
         toml::from_str(&self.text).map_err(|error| self.explain(error.message(), error.span().map(|span| span.start)))
     }
 
+    /// Whether it has a section, or a key outside of any, of that name.
+    #[must_use]
+    pub fn has(&self, section: &str) -> bool {
+        DeTable::parse(&self.text).is_ok_and(|root| root.get_ref().iter().any(|(name, _)| name.get_ref() == section))
+    }
+
+    /// Where the key at `keys` stands, in words: `run.toml:3:1`.
+    #[must_use]
+    pub fn place_of(&self, keys: &[&str]) -> String {
+        match self.error(keys, "").place {
+            Place::Line { line, column } => format!("{}:{line}:{column}", self.path.display()),
+            _ => self.path.display().to_string(),
+        }
+    }
+
     /// An error about the key at `keys`, such as `["mechanism", "0", "torque"]`; entries of lists go by number.
     #[must_use]
     pub fn error(&self, keys: &[&str], message: impl Into<String>) -> InputError {

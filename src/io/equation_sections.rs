@@ -7,7 +7,7 @@ use toml::Spanned;
 
 use super::document::Document;
 use super::error::InputError;
-use super::twin_file::{float, section, text};
+use super::toml_text::{float, section, text};
 
 /// Equations, as a document declares them; each section in the order of the document.
 #[derive(Debug, Clone, PartialEq, Default)]

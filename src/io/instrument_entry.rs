@@ -38,8 +38,13 @@ impl InstrumentEntry {
     /// The file of its calendar, as the document names it; none where it has no calendar, or one that goes by name.
     #[must_use]
     pub fn calendar_file(&self) -> Option<&str> {
-        self.calendar.as_deref().filter(|named| named.ends_with(".toml") || named.contains(['/', '\\']))
+        self.calendar.as_deref().filter(|named| names_a_file(named))
     }
+}
+
+/// Whether a calendar is that of a file, and no name.
+pub(super) fn names_a_file(calendar: &str) -> bool {
+    calendar.ends_with(".toml") || calendar.contains(['/', '\\'])
 }
 
 fn one() -> f64 {

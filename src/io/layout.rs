@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::run_file::FeedKind;
+use super::data_table::FeedKind;
 use super::stamp::Stamp;
 
 /// Whose columns a file of market data has: what they are called, in which units, and what a row means. It is declared,

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use super::error::InputError;
+use super::growing_table::GrowingTable;
 use super::output_table::OutputTable;
 
 /// Whether files that exist already may be replaced.
@@ -69,10 +70,25 @@ impl OutputFolder {
             file.sync_all()
         };
         write().map_err(|error| failed(&self.folder.join(name), &error))?;
+        self.remember(name);
+        Ok(())
+    }
+
+    fn remember(&mut self, name: &str) {
         if !self.names.iter().any(|earlier| earlier == name) {
             self.names.push(name.to_owned());
         }
-        Ok(())
+    }
+
+    /// Adds a Parquet file that is written some rows at a time, with the columns of `like`.
+    ///
+    /// # Errors
+    /// As [`file`](Self::file).
+    pub fn grow(&mut self, name: &str, like: &OutputTable) -> Result<GrowingTable, InputError> {
+        self.check_name(name)?;
+        let table = GrowingTable::create(&self.aside.path().join(NEW).join(name), self.folder.join(name), like)?;
+        self.remember(name);
+        Ok(table)
     }
 
     /// Adds a table, as CSV or Parquet by the ending of the name.

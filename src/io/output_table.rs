@@ -114,13 +114,7 @@ impl OutputTable {
     /// # Errors
     /// Another ending; columns that differ in length or share a name.
     pub fn bytes(&self, path: &Path) -> Result<Vec<u8>, InputError> {
-        let rows = self.columns.first().map_or(0, |(_, values)| values.len());
-        for (index, (name, values)) in self.columns.iter().enumerate() {
-            if values.len() != rows || self.columns[..index].iter().any(|(earlier, _)| earlier == name) {
-                let message = "the columns of a table differ in length or share a name";
-                return Err(InputError::new(path, message).in_column(name.as_str()));
-            }
-        }
+        let rows = self.check(path)?;
         match path.extension().and_then(|ending| ending.to_str()) {
             Some("csv") => Ok(self.csv(rows).into_bytes()),
             Some("parquet") => {
@@ -129,6 +123,18 @@ impl OutputTable {
             _ => Err(InputError::new(path, "the ending of the name says no format that is written")
                 .hint("tables are written as .csv or .parquet")),
         }
+    }
+
+    /// How many rows it has, where its columns are those of one table.
+    pub(super) fn check(&self, path: &Path) -> Result<usize, InputError> {
+        let rows = self.columns.first().map_or(0, |(_, values)| values.len());
+        for (index, (name, values)) in self.columns.iter().enumerate() {
+            if values.len() != rows || self.columns[..index].iter().any(|(earlier, _)| earlier == name) {
+                let message = "the columns of a table differ in length or share a name";
+                return Err(InputError::new(path, message).in_column(name.as_str()));
+            }
+        }
+        Ok(rows)
     }
 
     fn csv(&self, rows: usize) -> String {
@@ -148,9 +154,13 @@ impl OutputTable {
         out
     }
 
-    fn parquet(&self) -> PolarsResult<Vec<u8>> {
+    pub(super) fn frame(&self) -> PolarsResult<DataFrame> {
         let columns = self.columns.iter().map(|(name, values)| values.column(name)).collect::<PolarsResult<_>>()?;
-        let mut frame = DataFrame::new_infer_height(columns)?;
+        DataFrame::new_infer_height(columns)
+    }
+
+    fn parquet(&self) -> PolarsResult<Vec<u8>> {
+        let mut frame = self.frame()?;
         let mut bytes = Vec::new();
         ParquetWriter::new(&mut bytes).with_compression(ParquetCompression::Zstd(None)).finish(&mut frame)?;
         Ok(bytes)

@@ -1,25 +1,25 @@
 //! RUN.toml: what a backtest or a paper run is made of.
 
-use std::collections::BTreeSet;
 use std::fmt;
 use std::marker::PhantomData;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, DeserializeSeed, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-use super::data_table::{DataTable, data_entry};
+use super::data_table::{DataEntry, DataTable, FeedKind, data_entries};
 use super::document::{Document, HINT};
 use super::error::InputError;
-use super::feed_format::{FeedFormat, check_file};
+use super::execution_section::ExecutionSection;
+use super::feed_format::check_file;
 use super::feed_rules::span;
 use super::halt_entry::{HaltEntry, HaltTable, halt_entries};
 use super::instrument_entry::{InstrumentEntry, check_instruments, check_terms};
 use super::quantity::{MechanismEntry, check_mechanisms};
 use super::rate_entry::{RateEntry, RateSource, RateTable, rate_entries};
 use super::sweep_section::{SweepSection, SweepTable};
-use super::twin_file::AssumedPrice;
+use super::twin_file::{AssumedPrice, Assumptions, TwinFile};
 use crate::sim2real::{Timestamp, written_instant};
 
 /// A run, as its document declares it.
@@ -38,8 +38,14 @@ pub struct RunFile {
     pub halts: Vec<HaltEntry>,
     /// `kind` of `[strategy]`; its other keys are read by [`strategy_settings`](Self::strategy_settings).
     pub strategy: String,
-    /// `[[mechanism]]`: what stands between decision and fill.
+    /// `[[mechanism]]`: what stands between decision and fill; [`listed`](Self::listed) has those of a twin too.
     pub mechanisms: Vec<MechanismEntry>,
+    /// `[execution]`: what is known of how orders are executed.
+    pub execution: ExecutionSection,
+    /// The twin that `[execution]` brings.
+    pub twin: Option<Box<TwinFile>>,
+    /// `[assumptions]`, where the document is a twin too.
+    pub assumptions: Option<Assumptions>,
     /// `[sweep]`: which values of all that are tried. A backtest has no use for it.
     pub sweep: Option<SweepSection>,
 }
@@ -58,6 +64,9 @@ pub struct RunSection {
     pub max_leverage: Option<f64>,
     /// The price mechanisms start from; none for what suits them and the data.
     pub price: Option<AssumedPrice>,
+    /// Whether the data show what the orders of the run did to the market, which is then not added to them; none where nobody says,
+    /// and a run takes it that they do not.
+    pub shows_own_orders: Option<bool>,
     /// The first instant of data that counts; none for all from the first.
     #[serde(default, deserialize_with = "instant")]
     pub start: Option<Timestamp>,
@@ -71,52 +80,6 @@ pub struct RunSection {
     /// minute where data are streamed.
     #[serde(default, deserialize_with = "span")]
     pub equity_every: Option<i64>,
-}
-
-/// What a data file holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum FeedKind {
-    /// Bars: open, high, low, close and volume of an interval.
-    Bars,
-    /// Quotes: best bid and ask, and deeper levels.
-    Quotes,
-    /// Trades.
-    Trades,
-    /// Changes of an order book.
-    Book,
-    /// Dividends and splits.
-    Actions,
-}
-
-impl FeedKind {
-    /// The word for it in documents.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Bars => "bars",
-            Self::Quotes => "quotes",
-            Self::Trades => "trades",
-            Self::Book => "book",
-            Self::Actions => "actions",
-        }
-    }
-}
-
-/// `[[data]]`: a file of market data of one instrument.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DataEntry {
-    /// Symbol of the instrument.
-    pub symbol: String,
-    /// What the file holds.
-    pub kind: FeedKind,
-    /// The file.
-    pub path: PathBuf,
-    /// The file, as the document names it.
-    pub named: String,
-    /// How it is written.
-    pub format: FeedFormat,
-    /// Length of a bar [ns]; none where the distances between bars show it.
-    pub interval: Option<i64>,
 }
 
 #[derive(Deserialize)]
@@ -135,6 +98,12 @@ struct RunTable {
     #[serde(default)]
     mechanism: Vec<MechanismEntry>,
     sweep: Option<SweepTable>,
+    #[serde(default)]
+    execution: ExecutionSection,
+    assumptions: Option<Assumptions>,
+    /// Read by [`TwinFile`].
+    twin: Option<IgnoredAny>,
+    market: Option<IgnoredAny>,
     /// Read by whoever knows what they mean.
     #[serde(rename = "matching")]
     _matching: Option<IgnoredAny>,
@@ -155,7 +124,7 @@ impl RunFile {
     /// # Errors
     /// As [`read_toml`](super::read_toml); values out of their range; instruments and data that do not belong together.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
-        Self::parse(Document::read(path)?)?.resolved(|_| true)
+        Self::of_document(Document::read(path)?)
     }
 
     /// As [`read`](Self::read), but the files of market data need not exist: their rows come from elsewhere.
@@ -166,15 +135,17 @@ impl RunFile {
         Self::parse(Document::read(path)?)?.resolved(|kind| kind == FeedKind::Actions)
     }
 
+    /// As [`read`](Self::read), of a document that was read.
+    pub(super) fn of_document(document: Document) -> Result<Self, InputError> {
+        Self::parse(document)?.resolved(|_| true)
+    }
+
     /// The same with paths that start from where the program runs; files that it names must exist, of data those whose kind `must`.
     fn resolved(self, must: impl Fn(FeedKind) -> bool) -> Result<Self, InputError> {
         let run = self;
         for (index, data) in run.data.iter().enumerate().filter(|(_, data)| must(data.kind)) {
             let number = index.to_string();
-            check_file(&run.document, &["data", &number, data.kind.word()], &data.path.to_string_lossy())?;
-            if let Some(snapshot) = &data.format.snapshot {
-                check_file(&run.document, &["data", &number, "snapshot"], &snapshot.to_string_lossy())?;
-            }
+            data.check_files(&run.document, &number)?;
         }
         for (index, instrument) in run.instruments.iter().enumerate() {
             if let Some(named) = instrument.calendar_file() {
@@ -200,16 +171,19 @@ impl RunFile {
         };
         let rates = run.rates.into_iter().map(whence).collect();
         let halts = run.halts.into_iter().map(|halt| halt.resolved(&run.document)).collect();
-        let resolved = |data: DataEntry| {
-            let snapshot = data.format.snapshot.as_ref().map(|path| run.document.resolve(path));
-            DataEntry { path: run.document.resolve(&data.path), format: FeedFormat { snapshot, ..data.format }, ..data }
-        };
-        Ok(Self { data: run.data.into_iter().map(resolved).collect(), rates, halts, ..run })
+        let data = run.data.into_iter().map(|data| data.resolved(&run.document)).collect();
+        let twin = run.execution.read_twin(&run.document)?.map(Box::new);
+        Ok(Self { data, rates, halts, twin, ..run })
     }
 
     /// The run of a document; the files it names are neither looked for nor resolved.
     pub(super) fn parse(document: Document) -> Result<Self, InputError> {
-        let RunTable { run, instrument, data, rate, halt, strategy, mechanism, sweep, .. } = document.parse()?;
+        if document.has("twin") && !document.has("run") {
+            return Err(no_run(&document));
+        }
+        let table: RunTable = document.parse()?;
+        check_twin_sections(&document, &table)?;
+        let RunTable { run, instrument, data, rate, halt, strategy, mechanism, sweep, execution, assumptions, .. } = table;
         if !run.cash.is_finite() || run.cash < 0.0 {
             let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
             return Err(error.found(run.cash).hint("it is what the run starts with"));
@@ -231,25 +205,43 @@ impl RunFile {
         let rates = rate_entries(&document, &run.currency, rate, &instrument)?;
         let halts = halt_entries(&document, halt, &instrument)?;
         check_mechanisms(&document, &mechanism)?;
-        let data = data
-            .into_iter()
-            .enumerate()
-            .map(|(index, table)| data_entry(&document, &index.to_string(), table, &instrument, run.end))
-            .collect::<Result<Vec<_>, _>>()?;
+        let data = data_entries(&document, data, &instrument, run.end)?;
         if data.is_empty() {
             return Err(document.error(&[], "the run names no data").hint("add a [[data]] section"));
         }
-        let mut seen = BTreeSet::new();
-        if let Some(index) = data.iter().position(|d| !seen.insert((d.symbol.clone(), d.kind))) {
-            let message = format!("there are {} of `{}` already", data[index].kind.word(), data[index].symbol);
-            return Err(document.error(&["data", &index.to_string()], message).hint("join the files into one"));
-        }
         let sweep = sweep.map(|table| SweepSection::of(&document, table)).transpose()?;
         let strategy = strategy.kind;
-        let instruments = instrument;
-        let run = Self { document, run, instruments, data, rates, halts, strategy, mechanisms: mechanism, sweep };
+        let (instruments, mechanisms, twin) = (instrument, mechanism, None);
+        let run = Self {
+            document,
+            run,
+            instruments,
+            data,
+            rates,
+            halts,
+            strategy,
+            mechanisms,
+            execution,
+            twin,
+            assumptions,
+            sweep,
+        };
         run.sweep.iter().try_for_each(|sweep| run.check_sweep(sweep))?;
         Ok(run)
+    }
+
+    /// All `[[mechanism]]` entries that stand between decision and fill, each with its document and its number in it: those of
+    /// the run, then those of the twin it brings.
+    pub fn listed(&self) -> impl Iterator<Item = (&Document, usize, &MechanismEntry)> {
+        let of_twin =
+            self.twin.iter().flat_map(|twin| twin.mechanisms.iter().enumerate().map(|(k, m)| (twin.document(), k, m)));
+        self.mechanisms.iter().enumerate().map(|(k, m)| (&self.document, k, m)).chain(of_twin)
+    }
+
+    /// The `[assumptions]` that hold of its orders, each with its document.
+    pub fn assumed(&self) -> impl Iterator<Item = (&Document, &Assumptions)> {
+        let of_twin = self.twin.iter().filter_map(|twin| Some((twin.document(), twin.assumptions.as_ref()?)));
+        self.assumptions.iter().map(|own| (&self.document, own)).chain(of_twin)
     }
 
     /// The document.
@@ -301,6 +293,25 @@ impl RunFile {
     #[must_use]
     pub fn error(&self, keys: &[&str], message: impl Into<String>) -> InputError {
         self.document.error(keys, message)
+    }
+}
+
+/// The error of a twin that is to be run.
+fn no_run(document: &Document) -> InputError {
+    let name = document.path().file_name().unwrap_or_default().to_string_lossy();
+    let error = document.error(&["twin"], "a twin says how orders are executed, and not what is run: there is no [run]");
+    error.hint(format!("name it in a RUN.toml, with the two lines [execution] and twin = \"{name}\""))
+}
+
+/// Holds the sections of a twin to stand in a document that is one.
+fn check_twin_sections(document: &Document, table: &RunTable) -> Result<(), InputError> {
+    let sections = [("assumptions", table.assumptions.is_some()), ("market", table.market.is_some())];
+    match sections.into_iter().find(|(_, there)| *there && table.twin.is_none()) {
+        None => Ok(()),
+        Some((section, _)) => {
+            let error = document.error(&[section], format!("a run has no section [{section}], unless it is a twin too"));
+            Err(error.hint("add [twin] with model = \"execution\", or drop the section"))
+        }
     }
 }
 

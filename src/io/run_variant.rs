@@ -37,6 +37,7 @@ impl RunFile {
         let mut run = run.map_err(|error| self.blamed(values, error))?;
         run.data.clone_from(&self.data);
         run.rates.clone_from(&self.rates);
+        run.twin.clone_from(&self.twin);
         Ok(run)
     }
 

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::cell::{INFINITE, NO_INTEGER, Wrong, integer, number};
 use super::columnar::{Column, ColumnarFile, no_rows};
@@ -17,13 +18,16 @@ pub type Renames = BTreeMap<String, String>;
 
 /// A table as it was read from a file: rows in the file's order, columns by name.
 ///
-/// Columns are converted when they are asked for, so columns that nobody asks for may hold anything.
+/// Columns are converted when they are asked for, so columns that nobody asks for may hold anything. A clone shares what was read.
+#[derive(Clone)]
 pub struct Table {
     path: PathBuf,
     renames: Renames,
-    body: Body,
+    body: Arc<Body>,
     /// Data rows of the file before these, where its rows are counted and not its lines.
     before: usize,
+    /// The rows of the body that are of the table; none for all.
+    only: Option<Vec<u32>>,
 }
 
 enum Body {
@@ -53,7 +57,7 @@ impl Table {
     /// As [`read`](Self::read), and a rename of a column the file does not have.
     pub fn read_with(path: impl AsRef<Path>, renames: &Renames) -> Result<Self, InputError> {
         let table = Self::read_even_empty(path, renames)?;
-        match &table.body {
+        match &*table.body {
             _ if table.rows() > 0 => Ok(table),
             Body::Csv(csv) => Err(csv.no_rows(&table.path)),
             Body::Columnar(_) => Err(no_rows(&table.path)),
@@ -71,19 +75,36 @@ impl Table {
             Ending::CsvGz => Body::Csv(CsvText::first_block(path, unzip(path, open(path)?)?)?),
             Ending::Columnar(container) => Body::Columnar(ColumnarFile::read(path, open(path)?, container)?),
         };
-        let table = Self { path: path.to_path_buf(), renames: renames.clone(), body, before: 0 };
+        let table = Self::of(path, renames, body, 0);
         table.check_columns()?;
         Ok(table)
     }
 
     /// A block of the rows of a CSV file.
     pub(super) fn of_csv(path: &Path, renames: &Renames, block: CsvText) -> Self {
-        Self { path: path.to_path_buf(), renames: renames.clone(), body: Body::Csv(block), before: 0 }
+        Self::of(path, renames, Body::Csv(block), 0)
     }
 
     /// The rows of a columnar file that follow the first `before`.
     pub(super) fn of_piece(path: &Path, renames: &Renames, piece: ColumnarFile, before: usize) -> Self {
-        Self { path: path.to_path_buf(), renames: renames.clone(), body: Body::Columnar(piece), before }
+        Self::of(path, renames, Body::Columnar(piece), before)
+    }
+
+    fn of(path: &Path, renames: &Renames, body: Body, before: usize) -> Self {
+        Self { path: path.to_path_buf(), renames: renames.clone(), body: Arc::new(body), before, only: None }
+    }
+
+    /// The number in the body of a row of the table.
+    pub(super) fn row_in_file(&self, row: usize) -> u32 {
+        // Data frames count rows in 32 bits.
+        let row = row.try_into().unwrap_or(u32::MAX);
+        self.only.as_ref().map_or(row, |only| only.get(row as usize).copied().unwrap_or(row))
+    }
+
+    /// Those of the file's rows, by number from 0, without a copy of them: errors give the places they have in the file.
+    pub(super) fn with_rows(&self, rows: Vec<u32>) -> Self {
+        let (path, renames, body) = (self.path.clone(), self.renames.clone(), Arc::clone(&self.body));
+        Self { path, renames, body, before: self.before, only: Some(rows) }
     }
 
     /// Holds the columns to have names of their own, and the renames to be of columns that are there.
@@ -112,9 +133,10 @@ impl Table {
     /// Number of data rows; at least 1, but of [`read_even_empty`](Self::read_even_empty).
     #[must_use]
     pub fn rows(&self) -> usize {
-        match &self.body {
-            Body::Csv(csv) => csv.rows(),
-            Body::Columnar(file) => file.rows(),
+        match (&self.only, &*self.body) {
+            (Some(only), _) => only.len(),
+            (None, Body::Csv(csv)) => csv.rows(),
+            (None, Body::Columnar(file)) => file.rows(),
         }
     }
 
@@ -286,14 +308,15 @@ impl Table {
     /// Where data row `row`, from 0, is in the file.
     #[must_use]
     pub fn place(&self, row: usize) -> Place {
-        match &self.body {
+        let row = if self.only.is_some() { self.row_in_file(row) as usize } else { row };
+        match &*self.body {
             Body::Csv(csv) => Place::Row(csv.line(row)),
             Body::Columnar(_) => Place::Row(self.before + row + 1),
         }
     }
 
     fn own_names(&self) -> &[String] {
-        match &self.body {
+        match &*self.body {
             Body::Csv(csv) => csv.names(),
             Body::Columnar(file) => file.names(),
         }
@@ -306,9 +329,12 @@ impl Table {
     fn column(&self, name: &str) -> Result<Cells<'_>, InputError> {
         let own = self.own_name(name);
         let index = self.own_names().iter().position(|n| n == own).ok_or_else(|| self.no_column(own))?;
-        Ok(match &self.body {
-            Body::Csv(csv) => Cells::Text(Box::new((0..csv.rows()).map(move |row| csv.cell(row, index)))),
-            Body::Columnar(file) => match file.column(own) {
+        Ok(match (&*self.body, &self.only) {
+            (Body::Csv(csv), Some(only)) => {
+                Cells::Text(Box::new(only.iter().map(move |row| csv.cell(*row as usize, index))))
+            }
+            (Body::Csv(csv), None) => Cells::Text(Box::new((0..csv.rows()).map(move |row| csv.cell(row, index)))),
+            (Body::Columnar(file), only) => match file.column(own, only.as_deref()) {
                 // Some writers keep numbers as texts: they are read as a CSV's cells are.
                 Column::Texts(values) => {
                     Cells::Text(Box::new(values.into_iter().map(|v| v.map_or(Cow::Borrowed(""), Cow::Owned))))

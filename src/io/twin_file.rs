@@ -1,26 +1,23 @@
 //! TWIN.toml: a simulator, its parameters as it has them today, and what it already models.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use chrono_tz::Tz;
 use serde::{Deserialize, Serialize};
 
 use super::controller_entry::ControllerEntry;
+use super::data_table::{DataEntry, DataTable, data_entries};
 use super::document::Document;
 use super::equation_sections::{AttachEntry, EquationSections, InputEntry, Named, OutputEntry, StateEntry, in_order};
 use super::error::InputError;
-use super::feed_format::{FeedFormat, check_file, zone};
 use super::instrument_entry::{InstrumentEntry, check_instruments, check_no_terms};
+use super::market_files::{MarketFiles, MarketTable, market_files, market_keys};
 use super::quantity::{MechanismEntry, Quantity, check_mechanisms};
-use super::relative_path::path_from;
-use super::stamp::Stamp;
-use super::table::Renames;
-use super::time_format::TimeUnit;
+use super::run_file::RunFile;
+use super::toml_text::{float, section, short_form, table_form, text};
 use super::unit::check_unit;
 
-/// A twin, as its document declares it.
+/// A twin, as its document declares it: a TWIN.toml, or a RUN.toml, which says how its orders are executed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TwinFile {
     document: Document,
@@ -44,6 +41,12 @@ pub struct TwinFile {
     pub instruments: Vec<InstrumentEntry>,
     /// `[market]`: the tape the backtest ran on.
     pub market: Option<MarketFiles>,
+    /// `[[data]]`: the tape instrument by instrument, where no `[market]` names one.
+    pub data: Vec<DataEntry>,
+    /// The run that the document is, where it is one.
+    pub run: Option<Box<RunFile>>,
+    /// Keys of the document that what has been fitted says instead, such as `["latency", "order"]`.
+    pub superseded: Vec<[&'static str; 2]>,
 }
 
 /// One of `[channels]`.
@@ -98,19 +101,6 @@ impl AssumedPrice {
     }
 }
 
-/// `[market]`: the files of the tape, resolved, and how they are written.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct MarketFiles {
-    /// Quotes.
-    pub quotes: Option<PathBuf>,
-    /// Trades.
-    pub trades: Option<PathBuf>,
-    /// Bars.
-    pub bars: Option<PathBuf>,
-    /// How they are written.
-    pub format: FeedFormat,
-}
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TwinTable {
@@ -139,6 +129,15 @@ struct TwinTable {
     #[serde(default)]
     instrument: Vec<InstrumentEntry>,
     market: Option<MarketTable>,
+    #[serde(default)]
+    data: Vec<DataTable>,
+}
+
+/// What a document that is a run says as a twin.
+#[derive(Deserialize)]
+struct TwinOfRun {
+    twin: Option<TwinSection>,
+    market: Option<MarketTable>,
 }
 
 #[derive(Deserialize)]
@@ -148,23 +147,8 @@ struct TwinSection {
     step: Option<f64>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MarketTable {
-    quotes: Option<String>,
-    trades: Option<String>,
-    bars: Option<String>,
-    stamp: Option<Stamp>,
-    #[serde(default, deserialize_with = "zone")]
-    zone: Option<Tz>,
-    price_scale: Option<f64>,
-    time_unit: Option<TimeUnit>,
-    #[serde(default)]
-    columns: Renames,
-}
-
 impl TwinFile {
-    /// Reads TWIN.toml, and holds it to what can be held without knowing its model; the files it names must exist.
+    /// Reads TWIN.toml, or RUN.toml as the twin of how its orders are executed, and holds it to what can be held without knowing its model; the files it names must exist.
     ///
     /// # Errors
     /// As [`read_toml`](super::read_toml), and values out of their range.
@@ -177,6 +161,9 @@ impl TwinFile {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(document: Document) -> Result<Self, InputError> {
+        if document.has("run") {
+            return Self::of_run(RunFile::of_document(document)?);
+        }
         let table: TwinTable = document.parse()?;
         for (name, quantity) in &table.parameters {
             quantity.check(&document, &["parameters", name])?;
@@ -213,8 +200,20 @@ impl TwinFile {
             controller.check(&document)?;
         }
         let market = table.market.map(|market| market_files(&document, market)).transpose()?;
+        if !table.data.is_empty() && table.twin.model != "execution" {
+            let error = document.error(&["data"], format!("the model `{}` has no section [[data]]", table.twin.model));
+            return Err(error.hint("it is for `model = \"execution\"`; name recordings with --recording"));
+        }
+        let data = data_entries(&document, table.data, &table.instrument, None)?;
+        for (number, entry) in data.iter().enumerate() {
+            entry.check_files(&document, &number.to_string())?;
+        }
+        let data = data.into_iter().map(|entry| entry.resolved(&document)).collect();
         Ok(Self {
             document,
+            data,
+            run: None,
+            superseded: Vec::new(),
             model: table.twin.model,
             step: table.twin.step,
             parameters: table.parameters,
@@ -225,6 +224,29 @@ impl TwinFile {
             assumptions: table.assumptions,
             instruments: table.instrument,
             market,
+        })
+    }
+
+    /// The twin of how the orders of `run` are executed.
+    fn of_run(run: RunFile) -> Result<Self, InputError> {
+        let document = run.document().clone();
+        let TwinOfRun { twin, market } = document.parse()?;
+        let model = "execution";
+        if let Some(twin) = twin.filter(|twin| twin.model != model) {
+            let error = document.error(&["twin", "model"], format!("what is run is a twin of the model `{model}`"));
+            return Err(error.found_text(&twin.model).hint("drop [twin], or the sections of the run"));
+        }
+        let market = market.map(|market| market_files(&document, market)).transpose()?;
+        Ok(Self {
+            model: model.to_owned(),
+            mechanisms: run.mechanisms.clone(),
+            assumptions: run.assumptions,
+            instruments: run.instruments.clone(),
+            data: run.data.clone(),
+            document,
+            market,
+            run: Some(Box::new(run)),
+            ..Self::default()
         })
     }
 
@@ -251,9 +273,24 @@ impl TwinFile {
         })
     }
 
-    /// The twin as TOML, to be written into `folder`: reads back as this twin, files and all.
+    /// Whether its tape, or the data of the run that it is, show what own orders did; none where nobody says.
     #[must_use]
-    pub fn render(&self, folder: &Path) -> String {
+    pub fn shows_own_orders(&self) -> Option<bool> {
+        let of_tape = self.market.as_ref().and_then(|market| market.shows_own_orders);
+        of_tape.or_else(|| self.run.as_ref().and_then(|run| run.run.shows_own_orders))
+    }
+
+    /// The twin as TOML, to be written into `folder`: reads back as this twin, files and all. What is a run, or names its tape
+    /// instrument by instrument, is its document with what has changed, and the rest to the letter.
+    ///
+    /// # Errors
+    /// If the document is none any more.
+    pub fn render(&self, folder: &Path) -> Result<String, InputError> {
+        if self.run.is_some() || !self.data.is_empty() { self.changed_document(folder) } else { Ok(self.written(folder)) }
+    }
+
+    /// The twin as it is written anew.
+    fn written(&self, folder: &Path) -> String {
         let mut out = String::new();
         section(&mut out, "[twin]", [("model", Some(text(&self.model))), ("step", self.step.map(float))]);
         let parameters = self.parameters.iter().map(|(name, q)| (name.as_str(), Some(table_form(q))));
@@ -308,97 +345,4 @@ fn check_assumptions(document: &Document, assumptions: &Assumptions) -> Result<(
         return Err(error.hint("give `commission_bps` or `commission_per_share`"));
     }
     Ok(())
-}
-
-fn market_files(document: &Document, market: MarketTable) -> Result<MarketFiles, InputError> {
-    let format = FeedFormat::of(market.stamp, market.zone, market.time_unit, market.price_scale, market.columns);
-    format.check(document, &["market"], market.bars.is_some())?;
-    let resolve = |key: &str, named: Option<String>| -> Result<Option<PathBuf>, InputError> {
-        let Some(named) = named else { return Ok(None) };
-        check_file(document, &["market", key], &named)?;
-        Ok(Some(document.resolve(named)))
-    };
-    Ok(MarketFiles {
-        quotes: resolve("quotes", market.quotes)?,
-        trades: resolve("trades", market.trades)?,
-        bars: resolve("bars", market.bars)?,
-        format,
-    })
-}
-
-/// Adds a section, unless it has no keys; keys without a value are left out.
-pub(super) fn section<'a>(out: &mut String, head: &str, keys: impl IntoIterator<Item = (&'a str, Option<String>)>) {
-    let lines: Vec<String> =
-        keys.into_iter().filter_map(|(name, value)| Some(format!("{} = {}\n", key(name), value?))).collect();
-    if lines.is_empty() {
-        return;
-    }
-    let blank = if out.is_empty() { "" } else { "\n" };
-    // Writing to a String cannot fail.
-    let _ = write!(out, "{blank}{head}\n{}", lines.concat());
-}
-
-fn market_keys(market: &MarketFiles, folder: &Path) -> Vec<(&'static str, Option<String>)> {
-    let path = |p: &Option<PathBuf>| p.as_ref().map(|p| text(&path_from(folder, p)));
-    let format = &market.format;
-    let unit = match format.time.unit {
-        TimeUnit::Nanoseconds => None,
-        TimeUnit::Microseconds => Some("us"),
-        TimeUnit::Milliseconds => Some("ms"),
-        TimeUnit::Seconds => Some("s"),
-    };
-    let renames: Vec<String> = format.columns.iter().map(|(name, own)| format!("{} = {}", key(name), text(own))).collect();
-    vec![
-        ("quotes", path(&market.quotes)),
-        ("trades", path(&market.trades)),
-        ("bars", path(&market.bars)),
-        ("stamp", format.stamp.map(|stamp| text(stamp.word()))),
-        ("zone", (format.time.zone != Tz::UTC).then(|| text(format.time.zone.name()))),
-        ("time_unit", unit.map(text)),
-        ("price_scale", (format.price_scale != 1.0).then(|| float(format.price_scale))),
-        ("columns", (!renames.is_empty()).then(|| format!("{{ {} }}", renames.join(", ")))),
-    ]
-}
-
-fn table_form(quantity: &Quantity) -> String {
-    let unit = quantity.unit.as_ref().map(|unit| format!(", unit = {}", text(unit))).unwrap_or_default();
-    format!("{{ value = {}{unit}, uncertainty = {} }}", float(quantity.value), float(quantity.uncertainty))
-}
-
-/// A bare number where it is known exactly.
-pub(super) fn exact_form(quantity: &Quantity) -> String {
-    let bare = quantity.unit.is_none() && quantity.uncertainty == 0.0;
-    if bare { float(quantity.value) } else { table_form(quantity) }
-}
-
-/// A bare number where nothing more is known than that.
-fn short_form(quantity: &Quantity) -> String {
-    if *quantity == Quantity::bare(quantity.value) { float(quantity.value) } else { table_form(quantity) }
-}
-
-/// A finite number, in the shortest form that reads back as the same bits.
-pub(super) fn float(value: f64) -> String {
-    format!("{value:?}")
-}
-
-/// A basic string of one line, which may be a key too.
-pub(super) fn text(value: &str) -> String {
-    let mut out = String::from('"');
-    for c in value.chars() {
-        match c {
-            '"' | '\\' => out.extend(['\\', c]),
-            c if c.is_control() => {
-                // Writing to a String cannot fail.
-                let _ = write!(out, "\\u{:04x}", u32::from(c));
-            }
-            c => out.push(c),
-        }
-    }
-    out.push('"');
-    out
-}
-
-fn key(name: &str) -> String {
-    let bare = !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
-    if bare { name.to_owned() } else { text(name) }
 }

@@ -4,13 +4,14 @@ use crate::sim2real::{Recording, Timestamp};
 
 use super::{Book, InFlight, OrderLog, Seen, Side, Tape};
 
-/// Values by name, one an order; what nothing is known of has no column, and an order of which a value is not known has
-/// the median of the others, which speaks for no dependence.
+/// Values by name, one a row; what nothing is known of has no column, and an order of which a value is not known, and a look at the
+/// market, have the median of the others, which speaks for no dependence.
 ///
 /// Book and sizes are those the order found as far as its stamps tell ([`OrderLog::shown_delay`]). Units: times [s],
 /// sizes [units], prices [currency], moves and returns [bps].
 pub(super) fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, Vec<f64>)> {
     let log = &recording.stimulus;
+    let tick_size = log.instrument().tick_size;
     let rows = 0..log.orders().len();
     let by_order = |value: &dyn Fn(&InFlight) -> Option<f64>| log.orders().iter().map(value).collect::<Vec<_>>();
     let by_book = |value: &dyn Fn(&InFlight, &Book) -> Option<f64>| {
@@ -33,10 +34,22 @@ pub(super) fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, 
         ("number of the order", rows.clone().map(|row| Some(row as f64)).collect()),
         ("price", by_order(&|order| Some(order.mid))),
         ("price within its unit", by_order(&|order| Some(order.mid.rem_euclid(1.0)))),
+        ("assumed price within 5 ticks", by_order(&|order| Some(within_ticks(order, 5.0, tick_size)))),
+        ("assumed price within 10 ticks", by_order(&|order| Some(within_ticks(order, 10.0, tick_size)))),
+        ("assumed price within 100 ticks", by_order(&|order| Some(within_ticks(order, 100.0, tick_size)))),
+        ("time within a second", by_order(&|order| Some(within(order.decided_at, 1.0)))),
+        ("time within 10 s", by_order(&|order| Some(within(order.decided_at, 10.0)))),
+        ("time within a minute", by_order(&|order| Some(within(order.decided_at, 60.0)))),
+        ("time within five minutes", by_order(&|order| Some(within(order.decided_at, 300.0)))),
+        ("time within an hour", by_order(&|order| Some(within(order.decided_at, 3_600.0)))),
         ("return over 1 s after", by_order(&|order| move_over(log.tape(), order, 0.0, 1.0))),
         ("return over 10 s after", by_order(&|order| move_over(log.tape(), order, 0.0, 10.0))),
     ];
-    columns.into_iter().filter_map(|(name, values)| Some((name, complete(values)?))).collect()
+    let by_row = |values: Vec<Option<f64>>| {
+        let of = |row| log.order_of(row).and_then(|number| values[number]);
+        complete((0..log.rows()).map(of).collect())
+    };
+    columns.into_iter().filter_map(|(name, values)| Some((name, by_row(values)?))).collect()
 }
 
 /// The values with the median of the known in place of the unknown; none where nothing is known.
@@ -92,6 +105,16 @@ fn own_flow(orders: &[InFlight], seconds: f64) -> Vec<f64> {
         order.side.sign() * past.map(signed).sum::<f64>()
     };
     orders.iter().enumerate().map(flow).collect()
+}
+
+/// Where in a step of so many ticks the assumed price lies [ticks].
+fn within_ticks(order: &InFlight, step: f64, tick_size: f64) -> f64 {
+    (order.assumed / tick_size).round().rem_euclid(step)
+}
+
+/// Where in a period of so many seconds `time` lies [s].
+fn within(time: Timestamp, seconds: f64) -> f64 {
+    time.0.rem_euclid((seconds * Timestamp::NANOS as f64) as i64) as f64 * 1e-9
 }
 
 /// Seconds since midnight, UTC [s].

@@ -6,6 +6,7 @@ use crate::sim2real::Timestamp;
 
 use super::Price;
 use super::account::Ratio;
+use super::recent::Recent;
 
 const DAY: i64 = 86_400 * Timestamp::NANOS;
 
@@ -26,6 +27,8 @@ pub struct Daily {
     mean_volume: Option<f64>,
     /// As of the last completed day.
     volatility: Option<f64>,
+    /// What the last minutes were like, where anybody asks.
+    recent: Option<Box<Recent>>,
 }
 
 impl Default for Daily {
@@ -38,11 +41,17 @@ impl Default for Daily {
             closes: VecDeque::new(),
             mean_volume: None,
             volatility: None,
+            recent: None,
         }
     }
 }
 
 impl Daily {
+    /// One that is asked for the last minutes too.
+    pub(super) fn with_recent() -> Self {
+        Self { recent: Some(Box::default()), ..Self::default() }
+    }
+
     /// How many completed days are averaged: a month of trading.
     pub const DAYS: usize = 20;
     /// The fewest daily returns a volatility is made of.
@@ -57,6 +66,14 @@ impl Daily {
         }
         self.volume += volume;
         self.close = price;
+        if let Some(recent) = &mut self.recent {
+            recent.see(time, price.to_f64());
+        }
+    }
+
+    /// Standard deviation of the return over five minutes, of late (a fraction); none where nobody asked for it.
+    pub(super) fn recent_volatility(&self) -> Option<f64> {
+        self.recent.as_ref()?.volatility()
     }
 
     /// What was seen is told in the units of after a split, which is no return.
@@ -67,6 +84,9 @@ impl Daily {
         self.volumes.iter_mut().for_each(|volume| *volume *= units);
         self.closes.iter_mut().for_each(|close| *close /= units);
         self.mean_volume = self.mean_volume.map(|volume| volume * units);
+        if let Some(recent) = &mut self.recent {
+            recent.split(units);
+        }
     }
 
     fn turn(&mut self, time: Timestamp) {

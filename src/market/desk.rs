@@ -112,6 +112,7 @@ impl Session<'_> {
             multiplier: self.ledger.terms()[instrument].multiplier.get() as f64,
             average_daily_volume: about.average_daily_volume.or_else(|| daily.volume()),
             daily_volatility: about.daily_volatility.or_else(|| daily.volatility()),
+            recent_volatility: daily.recent_volatility(),
         };
         // Laws of commands say when it arrives and how much of a volume it may be; its quantity is its owner's.
         let shaped = self.venue.floors[instrument].shape(&decided);

@@ -2,9 +2,10 @@
 //! that leaves out are mechanisms.
 
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Timestamp, Typical,
+    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Site, Thetas, Tick, Timestamp, Typical,
 };
 
+use super::foresight::{self, Foresight};
 use super::{Book, InFlight, OrderLog, Role, Side};
 
 /// What an arriving order meets.
@@ -20,27 +21,43 @@ pub struct Met {
     pub displayed: f64,
     /// The mid that had been seen when it was decided, above what the mid was then [bps of it].
     pub seen: f64,
+    /// Whether what the market shows has been moved by own orders already.
+    pub shows_own: bool,
+    /// By how much the mid moves of itself between the last look and this one, a standard deviation [bps]; infinite where
+    /// nobody looks.
+    pub scatter: f64,
 }
 
 impl Met {
-    /// What an order meets that joins no queue.
+    /// What an order meets that joins no queue, in a market that does not know of it.
     #[must_use]
     pub fn at(book: Book, reference: f64, volume: f64) -> Self {
-        Self { book, reference, volume, displayed: 0.0, seen: 0.0 }
+        Self { book, reference, volume, displayed: 0.0, seen: 0.0, shows_own: false, scatter: f64::INFINITY }
     }
 }
 
 /// What mechanisms add to an execution; the default adds nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ExecutionEffect {
-    /// By how much the price is worse than the reference [currency]; negative where it is better.
+    /// By how much the price is worse than the reference [currency]; negative where it is better. What earlier orders have
+    /// moved is told apart, as `displaced`.
     pub concession: f64,
     /// Orders are filled in whole multiples of it [units]; 0 where any quantity can be filled.
     pub lot: f64,
     /// What stands ahead of an order that joins a queue beside what is displayed [units].
     pub ahead: f64,
-    /// By how much own orders have moved the market up that an order which rests waits in [currency].
+    /// By how much earlier orders of one's own have moved the market up [currency].
     pub displaced: f64,
+}
+
+impl ExecutionEffect {
+    /// By how much `order`, which takes or rests in the market it has `met`, does worse than the reference [currency]: an order
+    /// that takes pays what earlier ones have moved, unless the market shows it.
+    #[must_use]
+    pub fn paid(&self, order: &InFlight, met: &Met) -> f64 {
+        let unseen = order.takes() && !met.shows_own;
+        if unseen { self.concession + order.side.sign() * self.displaced } else { self.concession }
+    }
 }
 
 /// What is reported of an order, or of a position that is held.
@@ -68,6 +85,8 @@ pub struct Report {
     pub filled: f64,
     /// The mid that had been seen when it was decided, above what the mid was then [bps of it].
     pub seen: f64,
+    /// What the mid has done between the last look at it and this one, in standard deviations of what it does of itself.
+    pub mid: f64,
 }
 
 impl Default for Report {
@@ -85,6 +104,7 @@ impl Default for Report {
             cost: 0.0,
             filled: 0.0,
             seen: 0.0,
+            mid: 0.0,
         }
     }
 }
@@ -105,6 +125,7 @@ impl Report {
             cost: cost_bps(order.side, price, order.assumed, order.mid),
             filled: quantity / order.quantity,
             seen: 0.0,
+            mid: 0.0,
         }
     }
 
@@ -114,10 +135,10 @@ impl Report {
         self.until.seconds_since(self.since).max(0.0)
     }
 
-    /// Whether it tells of a trade, and not of a position that is held.
+    /// Whether it tells of a trade, and not of a position that is held or of a look at the market.
     #[must_use]
     pub fn trades(&self) -> bool {
-        self.role != Role::Holder
+        matches!(self.role, Role::Taker | Role::Maker)
     }
 
     /// What changed hands, or is held, multiplier included [currency].
@@ -145,7 +166,8 @@ impl Observation for Report {
             0 => self.cost,
             1 => fee_bps(self.fee, self.notional()).unwrap_or(0.0),
             2 => self.filled,
-            _ => self.seen,
+            3 => self.seen,
+            _ => self.mid,
         }
     }
 }
@@ -154,14 +176,29 @@ impl Observation for Report {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Execution;
 
-/// What is seen of an order: cost against the assumed price, fee, part filled, and the mid it was decided on.
-static CHANNELS: &[Channel] =
-    &[Channel::new("cost", "bps"), Channel::new("fee", "bps"), Channel::new("filled", ""), Channel::new("seen", "bps")];
+/// What is seen of an order: cost against the assumed price, fee, part filled, and the mid it was decided on; and what is seen of
+/// the market between orders: the mid.
+static CHANNELS: &[Channel] = &[
+    Channel::new("cost", "bps"),
+    Channel::new("fee", "bps").exact(),
+    Channel::new("filled", "").exact(),
+    Channel::new("seen", "bps"),
+    Channel::new("mid", "sd"),
+];
+
+/// An execution under way: the last report, and what the mid is on its way to.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Executed {
+    /// The last report.
+    pub report: Report,
+    /// What orders foresaw, and what the mid has done since it was looked at last.
+    pub foresight: Foresight,
+}
 
 impl Plant for Execution {
     type Command = InFlight;
     type Input = Met;
-    type State = Report;
+    type State = Executed;
     type Effect = ExecutionEffect;
     type Observation = Report;
     type Dynamics = Self;
@@ -203,8 +240,12 @@ impl Plant for Execution {
         }
     }
 
-    fn initial_parameters(&self, _recording: &Recording<OrderLog>, _row: usize) -> Vec<Parameter> {
-        Vec::new()
+    /// What orders foresaw is a matter of who sent them: it belongs to a recording, as the state does from which a motion starts.
+    fn initial_parameters(&self, recording: &Recording<OrderLog>, _row: usize) -> Vec<Parameter> {
+        if recording.stimulus.looks() == 0 {
+            return Vec::new();
+        }
+        foresight::NAMES.iter().map(|name| Parameter::new(name, "bps", 0.0)).collect()
     }
 
     fn resolution(&self, recording: &Recording<OrderLog>, channel: &str) -> f64 {
@@ -219,6 +260,14 @@ impl Plant for Execution {
         recording.stimulus.notes().to_vec()
     }
 
+    fn concerns(&self, site: Site, log: &OrderLog) -> bool {
+        log.shows(site)
+    }
+
+    fn aspects(&self, recording: &Recording<OrderLog>) -> Vec<Recording<OrderLog>> {
+        OrderLog::aspects(recording)
+    }
+
     fn dynamics(&self, _thetas: &Thetas) -> Self {
         *self
     }
@@ -227,12 +276,15 @@ impl Plant for Execution {
 impl Execution {
     /// Half a cent: what a fee that is rounded to the cent is off by at most [currency].
     const FEE_ROUNDING: f64 = 0.005;
+    /// What the rounding of mids is of what they do of themselves [sd]: as much as would cost a tenth of the evidence.
+    const PART_OF_NOISE: f64 = 0.3;
 
     /// To what precision a log can tell a channel, in its unit: no fit of it can be better than that.
     ///
     /// - `cost` and `seen` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
     /// - `fee` [bps]: half a cent over the notional;
-    /// - `filled` []: half a lot over the quantity.
+    /// - `filled` []: half a lot over the quantity;
+    /// - `mid`: a part of what the mid does of itself, in which it is told.
     ///
     /// Each is the median over the orders; 0 for a channel of another name, or without orders.
     #[must_use]
@@ -242,6 +294,8 @@ impl Execution {
             "cost" | "seen" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
             "fee" => Self::FEE_ROUNDING / (order.quantity * order.mid) * 1e4,
             "filled" => 0.5 * instrument.lot_size / order.quantity,
+            // It is told in what the mid does of itself, of which its rounding is a part.
+            "mid" => Self::PART_OF_NOISE,
             _ => 0.0,
         };
         median(recording.stimulus.orders().iter().map(of).collect()).unwrap_or(0.0)
@@ -261,24 +315,35 @@ fn whole_lots(quantity: f64, lot: f64) -> f64 {
 }
 
 impl Dynamics<Execution> for Execution {
-    fn initial(&self, initial: &Thetas) -> Vec<Report> {
-        vec![Report::default(); initial.lanes()]
+    fn initial(&self, initial: &Thetas) -> Vec<Executed> {
+        let alphas = |lane: usize| (0..initial.parameters()).map(move |k| initial.row(k)[lane]);
+        let state = |lane| Executed { foresight: Foresight::of(alphas(lane)), ..Executed::default() };
+        (0..initial.lanes()).map(state).collect()
     }
 
-    fn advance(&self, _tick: Tick, reports: &mut [Report], met: &[Met], orders: &[InFlight], effects: &[ExecutionEffect]) {
-        for (((report, met), order), effect) in reports.iter_mut().zip(met).zip(orders).zip(effects) {
-            let price = met.reference + order.side.sign() * effect.concession;
+    fn advance(&self, tick: Tick, states: &mut [Executed], met: &[Met], orders: &[InFlight], effects: &[ExecutionEffect]) {
+        for (((state, met), order), effect) in states.iter_mut().zip(met).zip(orders).zip(effects) {
             let quantity = match order.role {
+                Role::Watcher => {
+                    let moved = state.foresight.look(tick.time, effect.displaced / order.mid * 1e4);
+                    state.report = Report { role: Role::Watcher, mid: moved / met.scatter, ..Report::default() };
+                    continue;
+                }
                 // What is held is held, however much is traded.
                 Role::Holder => order.quantity,
                 // Of what would have filled it, whoever stands ahead of an order that rests gets the first part.
                 Role::Taker | Role::Maker => whole_lots((order.fillable(met.volume) - effect.ahead).max(0.0), effect.lot),
             };
-            *report = Report { seen: met.seen, ..Report::of(order, price, quantity) };
+            let price = met.reference + order.side.sign() * effect.paid(order, met);
+            state.report = Report { seen: met.seen, ..Report::of(order, price, quantity) };
+            // Whoever rests decided long ago.
+            if order.takes() {
+                state.foresight.decided(tick.time, order.side.sign());
+            }
         }
     }
 
-    fn observe(&self, states: &[Report], observations: &mut [Report]) {
-        observations.copy_from_slice(states);
+    fn observe(&self, states: &[Executed], observations: &mut [Report]) {
+        observations.iter_mut().zip(states).for_each(|(observation, state)| *observation = state.report);
     }
 }

@@ -201,6 +201,12 @@ impl History {
         Arc::unwrap_or_clone(self.bars)
     }
 
+    /// Its quotes alone, oldest first.
+    #[must_use]
+    pub fn into_quotes(self) -> Quotes {
+        Arc::unwrap_or_clone(self.quotes)
+    }
+
     /// Its quotes, oldest first.
     #[must_use]
     pub fn quotes(&self) -> &Quotes {

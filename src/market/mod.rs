@@ -23,10 +23,13 @@ mod data_summary;
 mod decimal;
 mod depth;
 mod depth_book;
+#[cfg(feature = "io")]
+mod depth_quotes;
 mod desk;
 mod equity_curve;
 mod execution;
 mod feed;
+mod foresight;
 mod halt;
 mod history;
 #[cfg(feature = "io")]
@@ -38,9 +41,15 @@ mod known;
 mod latency;
 mod ledger;
 mod line;
+#[cfg(feature = "io")]
+mod listed;
 mod log_entry;
 #[cfg(feature = "io")]
 mod log_folder;
+mod log_rows;
+#[cfg(feature = "io")]
+mod log_split;
+mod look;
 mod mail;
 mod margin_call;
 pub mod mechanism;
@@ -57,10 +66,14 @@ mod price_assumption;
 mod quote;
 mod rates;
 mod reason;
+mod recent;
 pub mod reconcile;
+pub mod response;
 mod row_check;
 #[cfg(feature = "io")]
 mod run;
+#[cfg(feature = "io")]
+mod run_as_twin;
 #[cfg(feature = "io")]
 mod run_beside;
 #[cfg(feature = "io")]
@@ -87,6 +100,9 @@ pub mod sweep;
 mod tape;
 #[cfg(feature = "io")]
 mod tape_file;
+pub mod tape_orders;
+#[cfg(feature = "io")]
+mod tapes;
 mod ticket;
 mod transit;
 #[cfg(feature = "io")]
@@ -115,8 +131,9 @@ pub use data_summary::DataSummary;
 pub use decimal::{DecimalError, Rounded};
 pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
 pub use depth_book::DepthBook;
-pub use execution::{Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
+pub use execution::{Executed, Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
 pub use feed::{Arrival, Feed};
+pub use foresight::Foresight;
 pub use halt::{Halt, HaltSeen, HaltSummary, UnderHalt, WhileHalted};
 pub use history::{History, HistoryError};
 pub use instrument::Instrument;
@@ -128,7 +145,7 @@ pub use ledger::{
 };
 pub use log_entry::{LogError, LogTable, LoggedFill, LoggedOrder, OrderType};
 #[cfg(feature = "io")]
-pub use log_folder::{LogSettings, read_log};
+pub use log_folder::LogReader;
 pub use mechanism::MECHANISMS;
 pub use money::{Cash, Increments, MoneyError, Price, Quantity};
 pub use order::{InFlight, Posted, Role, Side};
@@ -140,6 +157,8 @@ pub use reason::Reason;
 #[cfg(feature = "io")]
 pub use run::{PreparedRun, explained, prepare_run};
 #[cfg(feature = "io")]
+pub use run_as_twin::settle_trued_run;
+#[cfg(feature = "io")]
 pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
 #[cfg(feature = "io")]
 pub use run_stream::prepare_streaming_run;
@@ -148,11 +167,11 @@ pub use sources::Sources;
 pub use strategy::{Event, EventKind, News, Notice, Orders, Strategy, View};
 #[cfg(feature = "io")]
 pub use stream::FileStream;
-pub use stream::{Dated, Known, Stored, Stream, StreamError};
+pub use stream::{Dated, Departure, Known, NumberedPrint, OrderStep, Stored, Stream, StreamError};
 pub use tape::{Print, Seen, Tape};
 #[cfg(feature = "io")]
 pub use tape_file::{TapeFiles, read_tape};
 pub use ticket::{Bracket, Condition, Link, OrderId, OrderKind, Request, Ticket, TimeInForce};
 #[cfg(feature = "io")]
-pub use twin::{execution_assembly, execution_logs, execution_twin};
+pub use twin::{check_needs, execution_assembly, execution_logs, execution_twin};
 pub use venue::{Intrabar, LimitFill, Matching, QueueModel, Reference};

@@ -70,6 +70,8 @@ pub enum Role {
     Maker,
     /// No order at all: a position that is held, charged for the time since it was charged last.
     Holder,
+    /// No order at all: a look at the market between orders.
+    Watcher,
 }
 
 impl Role {
@@ -80,6 +82,7 @@ impl Role {
             Self::Taker => "taker",
             Self::Maker => "maker",
             Self::Holder => "holder",
+            Self::Watcher => "watcher",
         }
     }
 }
@@ -111,6 +114,8 @@ pub struct InFlight {
     pub average_daily_volume: Option<f64>,
     /// Standard deviation of the daily return (a fraction), where known.
     pub daily_volatility: Option<f64>,
+    /// Standard deviation of the return over five minutes, as it was when the order was decided (a fraction), where known.
+    pub recent_volatility: Option<f64>,
 }
 
 impl InFlight {
@@ -131,6 +136,7 @@ impl InFlight {
             multiplier: 1.0,
             average_daily_volume: None,
             daily_volatility: None,
+            recent_volatility: None,
         }
     }
 

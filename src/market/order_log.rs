@@ -4,12 +4,18 @@ use std::sync::Arc;
 
 use crate::sim2real::{Measured, Recording, Stimulus, Timestamp};
 
+use aspects::Aspect;
+
 use super::log_entry::fills_of_orders;
+use super::log_rows::{Made, Outcome, Stamps, made, market_orders, on_tape};
+use super::look::{Look, Traded, looks, shows_own};
 use super::shown_age::{ShownAge, shown_age};
 use super::{
-    Book, Execution, InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, Met, OrderType, Piece,
-    PriceAssumption, Role, Seen, Tape, cost_bps, fee_bps, own_print, shown_delay,
+    Book, Execution, InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, Met, PriceAssumption, Role, Seen,
+    Side, Tape, cost_bps, fee_bps, own_print, shown_delay,
 };
+
+mod aspects;
 
 /// Where the orders of a log went, and what a backtest assumes of them.
 #[derive(Debug, Clone)]
@@ -20,27 +26,51 @@ pub struct LogMarket {
     pub tape: Arc<Tape>,
     /// The price the twin assumes.
     pub price: PriceAssumption,
+    /// Whether the market that was shown is one in which the orders of the log were; none where nobody says, and it is to be found
+    /// out.
+    pub shows_own_orders: Option<bool>,
 }
 
-/// The orders of a log, and what each would have met.
+/// The orders of a log, and what each would have met; in the aspect of the mid, looks at the market between them.
 #[derive(Debug, Clone)]
 pub struct OrderLog {
     market: LogMarket,
     orders: Vec<InFlight>,
+    rows: Vec<Row>,
+    /// What was filled of each order [units].
+    executed: Vec<f64>,
+    /// At what price [currency], where anything was.
+    paid: Vec<Option<f64>>,
+    /// Fills of orders that rested, in order of time.
+    made: Vec<Made>,
+    /// Looks at the market, where it shows the orders.
+    looks: Vec<Look>,
+    /// What of the log is looked at.
+    aspect: Aspect,
+    shows_own_orders: bool,
     own_prints: Vec<Option<Timestamp>>,
     shown_delay: Option<f64>,
     shown_age: Option<f64>,
     notes: Vec<String>,
 }
 
-/// The largest part of a log that may be left out because the tape does not tell of it.
-const LEFT_OUT: f64 = 0.01;
+/// What a row of the recording is of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Row {
+    /// An order, by its number.
+    Order(usize),
+    /// A fill of an order that rested, by its number.
+    Made(usize),
+    /// A look at the mid.
+    Look(Look),
+}
 
 impl OrderLog {
-    /// The recording of a log: a row a market order, in order of decision, with the channels of [`Execution`].
+    /// The recording of a log: a row a market order, in order of decision, with the channels of [`Execution`]. Where the tape shows
+    /// what the orders did, one of its [`aspects`](Self::aspects) has rows between them for looks at the mid.
     ///
-    /// `cost` is lost (`None`) where nothing was filled, and where the order was larger than all that was displayed: how
-    /// it went on behind the last level is not in the data. `fee` is lost where nothing was filled. `seen` is there where orders
+    /// `cost` is lost (`None`) where nothing was filled; it and `filled` are where the order was larger than all that was displayed:
+    /// how it went on behind the last level is not in the data. `fee` is lost where nothing was filled. `seen` is there where orders
     /// say what they saw, and that is what the tape showed at one age before their decisions.
     ///
     /// # Errors
@@ -59,10 +89,15 @@ impl OrderLog {
                 format!("name {lacking} under [market] in the twin, or put them beside the orders"),
             ));
         }
-        let of_order = fills_of_orders(orders, fills)?;
+        // What no log can hold is said with the stamps that stand in it.
+        fills_of_orders(orders, fills)?;
         let mut notes = market.tape.notes().to_vec();
-        let rows = market_orders(orders, &mut notes)?;
-        let rows = on_tape(orders, rows, &market, &mut notes)?;
+        let Stamps { orders, fills, early } = Stamps::of(orders, fills, &market.tape, &mut notes);
+        let (orders, fills) = (orders.as_ref(), fills.as_ref());
+        let of_order = fills_of_orders(orders, fills)?;
+        let made = made(orders, &of_order, &market.tape);
+        let rows = market_orders(orders, &made, &mut notes)?;
+        let rows = on_tape(orders, rows, &market, !made.is_empty(), &mut notes)?;
         let in_flight: Vec<InFlight> = rows.iter().map(|(_, order)| *order).collect();
         let executions: Vec<Outcome> = rows.iter().map(|(row, order)| Outcome::of(order, &of_order[*row])).collect();
         let own_prints: Vec<Option<Timestamp>> = in_flight
@@ -72,13 +107,47 @@ impl OrderLog {
             .collect();
         let delays = in_flight.iter().zip(&own_prints).filter_map(|(o, p)| Some(p.as_ref()?.seconds_since(o.decided_at)));
         let shown_delay = shown_delay(delays.collect());
-        let mut log = Self { market, shown_delay, shown_age: None, own_prints, orders: in_flight, notes };
-        let first = log.orders[0].decided_at;
-        let time = log.orders.iter().map(|order| order.decided_at.seconds_since(first)).collect();
+        let fills = executions.iter().zip(&own_prints);
+        let traded: Vec<Traded> = fills.map(|(execution, print)| Traded::of(*print, execution.first_fill)).collect();
+        let tick_size = market.instrument.tick_size;
+        let early = |at: Timestamp| Timestamp(at.0 - early);
+        let traded: Vec<(Timestamp, Traded)> = in_flight
+            .iter()
+            .zip(traded)
+            .map(|(order, traded)| (early(order.decided_at), traded.reported_at(early)))
+            .collect();
+        let found_out = || shows_own(&market.tape, &in_flight, &traded, tick_size);
+        let shows_own_orders = market.shows_own_orders.unwrap_or_else(found_out);
+        let taken = traded.iter().copied();
+        let rested = made.iter().map(|made| early(made.order.decided_at)).map(|at| (at, Traded::Report(at)));
+        // Fills of orders that rest follow from the market, whether or not it shows them.
+        let looks = match (shows_own_orders, made.is_empty()) {
+            (true, _) => looks(&market.tape, &taken.chain(rested).collect::<Vec<_>>(), tick_size),
+            (false, false) => looks(&market.tape, &rested.collect::<Vec<_>>(), tick_size),
+            (false, true) => Vec::new(),
+        };
+        let mut log = Self {
+            rows: (0..in_flight.len()).map(Row::Order).collect(),
+            executed: executions.iter().map(|execution| execution.quantity).collect(),
+            paid: executions.iter().map(|execution| execution.price).collect(),
+            made,
+            looks,
+            aspect: Aspect::Orders,
+            shows_own_orders,
+            market,
+            shown_delay,
+            shown_age: None,
+            own_prints,
+            orders: in_flight,
+            notes,
+        };
+        if shows_own_orders {
+            log.notes.push("the tape shows what the orders of the log did to the market".to_owned());
+        }
         let mut measured = log.measure(&executions);
         let seen: Vec<Option<f64>> = rows.iter().map(|(row, _)| orders[*row].seen_mid).collect();
         measured.extend(log.look_at_seen(&seen));
-        Ok(Recording { name: name.to_owned(), time, stimulus: log, measured })
+        Ok(Recording { name: name.to_owned(), time: log.times(), stimulus: log, measured })
     }
 
     /// The recording of `orders` as they would be sent, in the order of their decisions, of which nothing is measured: what they
@@ -86,8 +155,6 @@ impl OrderLog {
     #[must_use]
     pub fn planned(name: &str, market: LogMarket, mut orders: Vec<InFlight>) -> Recording<Self> {
         orders.sort_by_key(|order| order.decided_at);
-        let first = orders.first().map_or_else(Timestamp::default, |order| order.decided_at);
-        let time = orders.iter().map(|order| order.decided_at.seconds_since(first)).collect();
         let lost = |(channel, unit): (&str, &str)| Measured {
             channel: channel.into(),
             unit: unit.into(),
@@ -95,8 +162,39 @@ impl OrderLog {
         };
         let measured = [("cost", "bps"), ("fee", "bps"), ("filled", "")].map(lost).into();
         let own_prints = vec![None; orders.len()];
-        let log = Self { market, orders, own_prints, shown_delay: None, shown_age: None, notes: Vec::new() };
-        Recording { name: name.to_owned(), time, stimulus: log, measured }
+        let rows = (0..orders.len()).map(Row::Order).collect();
+        let shows_own_orders = market.shows_own_orders.unwrap_or(false);
+        let log = Self {
+            market,
+            executed: orders.iter().map(|order| order.quantity).collect(),
+            paid: vec![None; orders.len()],
+            made: Vec::new(),
+            aspect: Aspect::Orders,
+            orders,
+            rows,
+            looks: Vec::new(),
+            shows_own_orders,
+            own_prints,
+            shown_delay: None,
+            shown_age: None,
+            notes: Vec::new(),
+        };
+        Recording { name: name.to_owned(), time: log.times(), stimulus: log, measured }
+    }
+
+    /// When each row is, from the first decision on [s].
+    fn times(&self) -> Vec<f64> {
+        let firsts = self.orders.first().into_iter().chain(self.made.first().map(|made| &made.order));
+        let first = firsts.map(|order| order.decided_at).min().unwrap_or_default();
+        self.rows.iter().map(|row| self.at(row).seconds_since(first)).collect()
+    }
+
+    fn at(&self, row: &Row) -> Timestamp {
+        match row {
+            Row::Order(number) => self.orders[*number].decided_at,
+            Row::Made(number) => self.made[*number].order.decided_at,
+            Row::Look(look) => look.at,
+        }
     }
 
     /// What is known of the channels, order by order; notes what is not.
@@ -107,13 +205,14 @@ impl OrderLog {
         });
         let cost = cost.collect();
         let fee = executions.iter().map(|e| fee_bps(e.fee, e.notional)).collect();
-        let filled = self.orders.iter().zip(executions).map(|(o, e)| Some((e.quantity / o.quantity).min(1.0))).collect();
+        let filled = self.orders.iter().zip(executions).zip(&exhausted);
+        let filled = filled.map(|((o, e), exhausted)| (!exhausted).then(|| (e.quantity / o.quantity).min(1.0))).collect();
         let count = self.orders.len();
         let larger = exhausted.iter().filter(|e| **e).count();
         if larger > 0 {
             self.notes.push(format!(
                 "{larger} of {count} orders are larger than all that was displayed when they arrived; \
-                 their cost is left out, since the book behind the last level is not in the data"
+                 what they cost and how much of them was filled is left out, since the book behind the last level is not in the data"
             ));
         }
         let unfilled = executions.iter().filter(|e| e.price.is_none()).count();
@@ -167,6 +266,33 @@ impl OrderLog {
         &self.orders
     }
 
+    /// The order that is in `row` of the recording; none where it is a look at the market.
+    #[must_use]
+    pub fn order_of(&self, row: usize) -> Option<usize> {
+        match self.rows.get(row)? {
+            Row::Order(number) => Some(*number),
+            Row::Made(_) | Row::Look(_) => None,
+        }
+    }
+
+    /// How many rows of the recording are.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// How many of them are looks at the market.
+    #[must_use]
+    pub fn looks(&self) -> usize {
+        self.rows.iter().filter(|row| matches!(row, Row::Look(_))).count()
+    }
+
+    /// Whether the tape shows what the orders did to the market.
+    #[must_use]
+    pub fn shows_own_orders(&self) -> bool {
+        self.shows_own_orders
+    }
+
     /// The first print of each order's own trades, where it was found on the tape.
     #[must_use]
     pub fn own_prints(&self) -> &[Option<Timestamp>] {
@@ -206,7 +332,12 @@ impl OrderLog {
     /// Whether any of the orders meets the market as a `role`.
     #[must_use]
     pub fn has_a(&self, role: Role) -> bool {
-        self.orders.iter().any(|order| order.role == role)
+        self.orders.iter().any(|order| order.role == role) || role == Role::Maker && self.rests()
+    }
+
+    /// Whether a row is a fill of an order that rested.
+    fn rests(&self) -> bool {
+        self.rows.iter().any(|row| matches!(row, Row::Made(_)))
     }
 
     /// Whether the tape knows the volume an order meets.
@@ -214,6 +345,13 @@ impl OrderLog {
     pub fn knows_volume(&self) -> bool {
         let first = self.orders.first();
         first.is_some_and(|order| self.tape().volume(order.side, Seen::at(order.decided_at)).is_finite())
+    }
+
+    /// Adds what a reader of results should know.
+    #[must_use]
+    pub fn with_note(mut self, note: impl Into<String>) -> Self {
+        self.notes.push(note.into());
+        self
     }
 
     /// What a reader of results should know: what was left out, and why.
@@ -225,11 +363,36 @@ impl OrderLog {
 
 impl Stimulus<Execution> for OrderLog {
     fn command(&self, row: usize) -> InFlight {
-        self.orders[row]
+        match self.rows[row] {
+            Row::Order(number) => self.orders[number],
+            Row::Made(number) => self.made[number].order,
+            Row::Look(look) => InFlight::market(Side::Buy, 0.0, look.at, look.mid, look.mid).as_a(Role::Watcher),
+        }
     }
 
     fn input(&self, row: usize, arriving: &InFlight) -> Met {
-        let seen = Seen::by(arriving, self.own_prints[row]);
+        match self.rows[row] {
+            Row::Order(number) => match self.paid[number].filter(|_| self.aspect == Aspect::Fees) {
+                // What is charged is charged for what was paid, whatever it should have been.
+                Some(price) => Met::at(Book::at_price(arriving.decided_at, price), price, f64::INFINITY),
+                None => self.met(number, arriving),
+            },
+            Row::Made(number) => {
+                let Made { order, price, .. } = self.made[number];
+                Met::at(Book::at_price(order.decided_at, price), price, f64::INFINITY)
+            }
+            Row::Look(look) => {
+                let nothing = Met::at(Book::at_price(look.at, look.mid), look.mid, 0.0);
+                Met { scatter: look.scatter, shows_own: self.shows_own_orders, ..nothing }
+            }
+        }
+    }
+}
+
+impl OrderLog {
+    /// What order `number` meets as it arrives.
+    fn met(&self, number: usize, arriving: &InFlight) -> Met {
+        let seen = Seen::by(arriving, self.own_prints[number]);
         let tape = self.tape();
         let book = tape.book(seen);
         // Where the tape has ended or shows one side only, the assumption stays as it was at the decision.
@@ -240,11 +403,10 @@ impl Stimulus<Execution> for OrderLog {
         // What rests joins the best price of its own side.
         let joined = book.opposite(arriving.side.opposite()).first().filter(|_| arriving.role == Role::Maker);
         let displayed = joined.map_or(0.0, |level| level.size);
-        Met { displayed, seen: self.moved_since_seen(arriving), ..Met::at(book, reference, volume) }
+        let (seen, shows_own) = (self.moved_since_seen(arriving), self.shows_own_orders);
+        Met { displayed, seen, shows_own, ..Met::at(book, reference, volume) }
     }
-}
 
-impl OrderLog {
     /// The mid that had been seen when `order` was decided, above what the mid was then [bps].
     fn moved_since_seen(&self, order: &InFlight) -> f64 {
         // A log that does not say what was seen is not asked: looking up costs time.
@@ -258,138 +420,4 @@ impl OrderLog {
 /// How far `price` is above `mid` [bps of it].
 fn above(price: f64, mid: f64) -> f64 {
     (price - mid) / mid * 1e4
-}
-
-/// What became of one order.
-struct Outcome {
-    pieces: Vec<Piece>,
-    first_fill: Option<Timestamp>,
-    quantity: f64,
-    notional: f64,
-    fee: f64,
-    /// Average price, where anything was filled.
-    price: Option<f64>,
-}
-
-impl Outcome {
-    fn of(order: &InFlight, fills: &[&LoggedFill]) -> Self {
-        let quantity: f64 = fills.iter().map(|fill| fill.quantity).sum();
-        // Summed as distances from the mid, so that the average of equal prices is that price to the last digits.
-        let beyond: f64 = fills.iter().map(|fill| fill.quantity * (fill.price - order.mid)).sum();
-        Self {
-            pieces: fills.iter().map(|fill| Piece { quantity: fill.quantity, price: fill.price }).collect(),
-            first_fill: fills.first().map(|fill| fill.filled_at),
-            quantity,
-            notional: fills.iter().map(|fill| fill.quantity * fill.price).sum(),
-            fee: fills.iter().map(|fill| fill.fee).sum(),
-            price: (quantity > 0.0).then(|| order.mid + beyond / quantity),
-        }
-    }
-}
-
-/// Rows of the market orders, in order of decision.
-fn market_orders(orders: &[LoggedOrder], notes: &mut Vec<String>) -> Result<Vec<usize>, LogError> {
-    let mut rows: Vec<usize> = (0..orders.len()).filter(|row| orders[*row].kind == OrderType::Market).collect();
-    let others = orders.len() - rows.len();
-    if rows.is_empty() {
-        let kinds = orders.iter().find_map(|order| match &order.kind {
-            OrderType::Other(kind) => Some(kind.as_str()),
-            OrderType::Market => None,
-        });
-        return Err(LogError::of(
-            LogTable::Orders,
-            format!("none of the {others} orders is a market order; the first is \"{}\"", kinds.unwrap_or_default()),
-            "only market orders are modelled so far",
-        ));
-    }
-    if others > 0 {
-        notes.push(format!("{others} of {} orders are not market orders and are left out", orders.len()));
-    }
-    rows.sort_by_key(|row| orders[*row].decided_at);
-    Ok(rows)
-}
-
-/// The orders of `rows` of whose decision the tape tells, as they were sent.
-fn on_tape(
-    orders: &[LoggedOrder],
-    rows: Vec<usize>,
-    market: &LogMarket,
-    notes: &mut Vec<String>,
-) -> Result<Vec<(usize, InFlight)>, LogError> {
-    let Some((first, last)) = market.tape.span() else {
-        return Err(LogError::of(
-            LogTable::Orders,
-            "there are neither quotes nor trades nor bars beside the orders",
-            "name a tape under [market] in the twin, or put quotes, trades or bars into the folder",
-        ));
-    };
-    // Silence after the last row of a tape is no stranger than silence within it.
-    let last = last + market.tape.longest_silence();
-    let (count, mut outside, mut unknown) = (rows.len(), Vec::new(), 0);
-    let mut sent = Vec::with_capacity(count);
-    for row in rows {
-        let order = &orders[row];
-        let (at, seen) = (order.decided_at, Seen::at(order.decided_at));
-        if at < first || at > last {
-            outside.push((row, if at < first { first.seconds_since(at) } else { at.seconds_since(last) }, at < first));
-            continue;
-        }
-        let assumed = market.price.price(&market.tape, order.side, seen);
-        match assumed.zip(market.tape.mid(seen)) {
-            Some((assumed, mid)) => {
-                let mut in_flight = InFlight::market(order.side, order.quantity, at, assumed, mid);
-                in_flight.average_daily_volume = market.instrument.average_daily_volume;
-                in_flight.daily_volatility = market.instrument.daily_volatility;
-                sent.push((row, in_flight));
-            }
-            None => unknown += 1,
-        }
-    }
-    let too_many = |part: usize| part as f64 > LEFT_OUT * count as f64;
-    if let Some((row, seconds, before)) = outside.first().copied()
-        && too_many(outside.len())
-    {
-        let (end, from) = if before { ("before the tape begins", first) } else { ("after the tape ends", last) };
-        return Err(LogError {
-            cell: Some((row, "decided_at")),
-            found: Some(orders[row].decided_at.to_string()),
-            ..LogError::of(
-                LogTable::Orders,
-                format!(
-                    "{} of {count} orders are outside the tape; this one is decided {seconds:.3} s {end} ({from})",
-                    outside.len()
-                ),
-                outside_hint(seconds),
-            )
-        });
-    }
-    if too_many(unknown) || sent.is_empty() {
-        return Err(LogError::of(
-            LogTable::Orders,
-            format!(
-                "for {unknown} of {count} orders the tape does not know the price \"{}\" when they were decided",
-                market.price
-            ),
-            "does the tape begin early enough, and has it both bid and ask?",
-        ));
-    }
-    if outside.len() + unknown > 0 {
-        notes.push(format!(
-            "{} of {count} orders are left out: the tape does not know a price when they were decided",
-            outside.len() + unknown
-        ));
-    }
-    Ok(sent)
-}
-
-/// What may be behind orders that are `seconds` [s] off the tape.
-fn outside_hint(seconds: f64) -> String {
-    let hours = (seconds / 3600.0).round();
-    if (1.0..=14.0).contains(&hours) {
-        return format!("is one of the files in another zone, {hours} h or more away? Declare its `zone`");
-    }
-    if seconds > 365.25 * 86_400.0 {
-        return "are times in another unit than nanoseconds? Declare `time_unit`".to_owned();
-    }
-    "do orders and tape come from the same days?".to_owned()
 }

@@ -89,6 +89,18 @@ impl Quotes {
         self.depth
     }
 
+    /// The same in order of time; those of one time stay in their order.
+    #[cfg(feature = "io")]
+    pub(super) fn in_order(&self) -> Self {
+        let mut order: Vec<usize> = (0..self.len()).collect();
+        order.sort_by_key(|k| self.times[*k]);
+        let mut sorted = Self::with_depth(self.depth);
+        for quote in order.into_iter().filter_map(|k| self.all().get(k)) {
+            sorted.push(quote.time, quote.bids, quote.asks);
+        }
+        sorted
+    }
+
     /// Forgets all but the newest `count`.
     pub(super) fn keep_newest(&mut self, count: usize) {
         let gone = self.len().saturating_sub(count);

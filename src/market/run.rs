@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 
 use chrono_tz::Tz;
 
-use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash, listed_mechanism};
+use crate::io::{AssumedPrice, DataEntry, FeedKind, InputError, RunFile, file_hash};
 use crate::sim2real::{Assembly, Seed, Timestamp, Twin};
 
 use super::account_file::account;
+use super::listed;
+use super::run_as_twin::price;
 use super::run_beside::Beside;
 use super::run_log::InputFile;
 use super::{
-    Backtest, BacktestError, Calendar, Cash, Execution, History, Instrument, Latencies, MECHANISMS, Matching, MoneyError,
-    Provenance, Record, Reference, RunOutputs, Settings, StreamError, run_needs,
+    Backtest, BacktestError, Calendar, Cash, Execution, History, Instrument, Latencies, Matching, MoneyError, Provenance,
+    Record, Reference, RunOutputs, Settings, StreamError, run_needs,
 };
 
 /// A backtest as a run declares it, with its data read.
@@ -87,13 +89,19 @@ pub(super) fn settings(run: &RunFile, histories: &[History], beside: &Beside) ->
         seed: Seed(run.run.seed),
         max_leverage: run.run.max_leverage.unwrap_or(borrowing_nothing.max_leverage),
         reference: reference(run, histories)?,
-        matching: run.matching::<Matching>()?,
+        matching: Matching { shows_own_orders: shows_own_orders(run), ..run.matching::<Matching>()? },
         latencies: run.latency::<Latencies>()?,
         equity_every: run.run.equity_every.or(run.run.stream.then_some(60 * Timestamp::NANOS)),
         calendars: beside.calendars.clone().of(run)?,
         halts: beside.halts.all.clone(),
         account: account(run, beside.account.clone())?,
     })
+}
+
+/// Whether the data show what own orders did, as the run says, or the twin that it brings.
+fn shows_own_orders(run: &RunFile) -> bool {
+    let brought = run.twin.as_ref().and_then(|twin| twin.shows_own_orders());
+    run.run.shows_own_orders.or(brought).unwrap_or(false)
 }
 
 impl PreparedRun {
@@ -146,18 +154,13 @@ fn own_document(run: &RunFile) -> Result<InputFile, InputError> {
     Ok(InputFile { path: name, sha256: file_hash(path)?, rows: None })
 }
 
-/// The execution plant with the mechanisms of `run`.
+/// The execution plant with the mechanisms of `run`, and those of a twin that it brings.
 pub(super) fn venue(run: &RunFile) -> Result<Assembly<Execution>, InputError> {
-    let mut venue = Assembly::new(Execution, MECHANISMS);
-    for (index, entry) in run.mechanisms.iter().enumerate() {
-        let (mechanism, form, parameters) = listed_mechanism(run.document(), index, entry, &Execution, MECHANISMS)?;
-        venue = venue.with_mechanism(mechanism, form, parameters);
-    }
-    Ok(venue)
+    listed::assembly(run.listed(), run.assumed(), &[])
 }
 
 /// The history in a data file.
-fn history(entry: &DataEntry) -> Result<History, InputError> {
+pub(super) fn history(entry: &DataEntry) -> Result<History, InputError> {
     match entry.kind {
         // They are no data of a market.
         FeedKind::Actions => Ok(History::default()),
@@ -205,11 +208,23 @@ pub(super) fn span(run: &RunFile) -> Option<(Timestamp, Timestamp)> {
     (start.is_some() || end.is_some()).then_some((start.unwrap_or(Timestamp::MIN), last))
 }
 
-/// What `[run] price` asks for, as far as the data have it.
+/// The price that is asked for, in `[run]` or by a twin, as far as the data have it.
 fn reference(run: &RunFile, histories: &[History]) -> Result<Option<Reference>, InputError> {
-    let Some(price) = run.run.price else { return Ok(None) };
-    let refuse = |message: String, hint: &str| Err(run.error(&["run", "price"], message).hint(hint));
-    let quoted = histories.iter().any(|history| !history.quotes().is_empty());
+    let Some(price) = price(run)? else { return Ok(None) };
+    let place = match () {
+        () if run.run.price.is_some() => ["run", "price"],
+        () if run.assumptions.is_some() => ["assumptions", "price"],
+        () => ["execution", "twin"],
+    };
+    let refuse = |message: String, hint: &str| Err(run.error(&place, message).hint(hint));
+    let shows = |history: &History| {
+        !(history.quotes().is_empty() && history.depth().is_empty() && history.order_events().is_empty())
+    };
+    let quoted = histories.iter().any(shows);
+    // Where trades are all there is, orders meet the last of them.
+    if price == AssumedPrice::Last && !quoted && histories.iter().all(|history| history.bars().is_empty()) {
+        return Ok(None);
+    }
     match (price, quoted) {
         (AssumedPrice::Mid, true) => Ok(Some(Reference::Mid)),
         (AssumedPrice::Touch, true) => Ok(Some(Reference::Touch)),

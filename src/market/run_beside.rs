@@ -70,6 +70,9 @@ impl Beside {
             }
         }
         inputs.extend(self.halts.files.iter().cloned());
+        if let (Some(named), Some(twin)) = (&run.execution.twin, &run.twin) {
+            inputs.push(InputFile { path: named.clone(), sha256: file_hash(twin.document().path())?, rows: None });
+        }
         Ok(inputs)
     }
 }

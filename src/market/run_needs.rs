@@ -6,7 +6,7 @@ use crate::sim2real::Assembly;
 use super::mechanism::{Lack, needs};
 use super::{Execution, History, Instrument};
 
-/// Holds the mechanisms of `venue`, which stand in the order in which `run` lists them, to have the data they need for every
+/// Holds the mechanisms of `venue`, that of `run`, to have the data they need for every
 /// instrument.
 ///
 /// # Errors
@@ -17,7 +17,7 @@ pub(super) fn check(
     instruments: &[Instrument],
     histories: &[History],
 ) -> Result<(), InputError> {
-    for (index, (mechanism, form, _)) in venue.mechanisms().enumerate() {
+    for (mechanism, form, _) in venue.mechanisms() {
         let id = mechanism.about().name;
         let lacking = |(instrument, history): (&Instrument, &History)| {
             let lack = needs(id, form).iter().find_map(|need| need.lacking(instrument, history))?;
@@ -25,7 +25,12 @@ pub(super) fn check(
         };
         let Some((symbol, Lack { what, hint })) = instruments.iter().zip(histories).find_map(lacking) else { continue };
         let message = format!("`{id}` needs {what}, and there are none of `{symbol}`");
-        return Err(run.error(&["mechanism", &index.to_string(), "name"], message).hint(hint));
+        let own = run.mechanisms.iter().position(|entry| entry.name == id).map(|index| index.to_string());
+        let error = match &own {
+            Some(index) => run.error(&["mechanism", index, "name"], message),
+            None => run.error(&["execution", "twin"], message),
+        };
+        return Err(error.hint(hint));
     }
     Ok(())
 }

@@ -17,6 +17,7 @@ use super::latency::Clocks;
 use super::line::Line;
 use super::mail::Mail;
 use super::mechanism::StaleQuotes;
+use super::mechanism::{Need, needs};
 use super::sources::RowKind;
 use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
@@ -110,9 +111,19 @@ impl<'d> Session<'d> {
             symbols: setup.instruments.iter().map(|i| i.symbol.as_str()).collect(),
             increments: &setup.increments,
             depth,
-            rules: Rules { reference, intrabar, limit_fill, queue, halted: matching.halted, origin },
+            rules: Rules {
+                reference,
+                intrabar,
+                limit_fill,
+                queue,
+                halted: matching.halted,
+                shows_own: matching.shows_own_orders,
+                origin,
+            },
             seed,
         };
+        let asks = |id: &str, form: usize| needs(id, form).contains(&Need::RecentVolatility);
+        let asks_recent = setup.venue.mechanisms().any(|(mechanism, form, _)| asks(mechanism.about().name, form));
         let mut venue = Venue::new(&setup.venue, &venue);
         let conceding = venue.conceding.len();
         let count = setup.instruments.len();
@@ -137,7 +148,7 @@ impl<'d> Session<'d> {
             clocks: Clocks::new(latencies, stale, seed),
             timetable,
             known,
-            daily: vec![Daily::default(); count],
+            daily: vec![if asks_recent { Daily::with_recent() } else { Daily::default() }; count],
             blotter: Blotter { conceding: venue.conceding.clone(), ..Blotter::default() },
             venue,
             data_of,

@@ -22,6 +22,7 @@ mod file_stream;
 mod lean;
 #[cfg(feature = "io")]
 mod order_rows;
+mod order_step;
 #[cfg(feature = "io")]
 mod print_rows;
 #[cfg(feature = "io")]
@@ -44,6 +45,7 @@ pub(super) use between::Between;
 pub use file_stream::FileStream;
 #[cfg(feature = "io")]
 pub(super) use file_stream::bars_of;
+pub use order_step::{Departure, NumberedPrint, OrderStep};
 pub use stored::Stored;
 #[cfg(feature = "io")]
 pub(super) use table_rows::{TableRows, check_rows};

@@ -102,6 +102,9 @@ pub struct Matching {
     pub queue: QueueModel,
     /// What becomes of orders that come in a halt.
     pub halted: WhileHalted,
+    /// Whether the data show what the orders of the run did to the market: those that follow then find it there.
+    #[serde(skip)]
+    pub shows_own_orders: bool,
 }
 
 /// The floors of all instruments, and what their laws are called.

@@ -1,31 +1,68 @@
-//! What a user would bring: a twin and recordings, and nothing that tells what is concealed.
+//! A case of either domain, from its drawing to its diagnosis.
 
-use crate::conceal::Table;
-use crate::conceal::benchmark::Case;
-use crate::robot::{Axis, Commands, Joint, MECHANISMS};
-use crate::sim2real::{Assembly, Measured, Recording};
+use super::domain::Domain;
+use super::seal::Sealed;
+use super::trial::Trial;
+use super::{joint, trading};
+use crate::conceal::{Concealed, benchmark, trading as market};
+use crate::market::LogError;
+use crate::sim2real::Seed;
 
-/// The twin of a case.
-#[must_use]
-pub fn twin(case: &Case) -> Assembly<Joint> {
-    let axis = if case.linear { Axis::Linear } else { Axis::Rotary };
-    Assembly::new(Joint::new(axis, case.nominal, case.uncertainty), MECHANISMS)
+/// What was concealed, with all that a user would bring.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Case {
+    /// In a joint.
+    Joint(Box<benchmark::Case>),
+    /// In days of orders.
+    Trading(Box<market::TradingCase>),
 }
 
-/// Its recordings: to learn from, and to test on.
-#[must_use]
-pub fn recordings(case: &Case) -> [Recording<Commands>; 2] {
-    let unit = if case.linear { "m" } else { "rad" };
-    [("train", &case.train), ("test", &case.test)].map(|(name, table)| recording(name, table, unit))
-}
+impl Case {
+    /// Case `index` of `seed`: always the same.
+    #[must_use]
+    pub fn draw(domain: Domain, seed: Seed, index: usize) -> Self {
+        match domain {
+            Domain::Robot => Self::Joint(Box::new(benchmark::draw(seed, index))),
+            Domain::Market => Self::Trading(Box::new(market::draw(seed, index))),
+        }
+    }
 
-fn recording(name: &str, table: &Table, unit: &str) -> Recording<Commands> {
-    let column = |name| table.real(name).unwrap_or_default().to_vec();
-    let samples = column("q").into_iter().map(Some).collect();
-    Recording {
-        name: name.to_owned(),
-        time: column("t"),
-        stimulus: Commands(column("u")),
-        measured: vec![Measured { channel: "position".to_owned(), unit: unit.to_owned(), samples }],
+    /// Its label, sealed.
+    ///
+    /// # Errors
+    /// None but a bug: a label is always JSON.
+    pub fn sealed(&self, seed: Seed) -> Result<Sealed, serde_json::Error> {
+        match self {
+            Self::Joint(case) => Sealed::new(&case.label, case.label.index, seed),
+            Self::Trading(case) => Sealed::new(&case.label, case.label.index, seed),
+        }
+    }
+
+    /// Whether it is quicker drawn again than kept: its tables are long.
+    #[must_use]
+    pub fn is_large(&self) -> bool {
+        matches!(self, Self::Trading(_))
+    }
+
+    /// Diagnoses it without a look at its label; the oracle alone is told, and only then. `clock` gives a time [s].
+    ///
+    /// # Errors
+    /// None but a bug: what is generated can be read.
+    pub fn tried(&self, clock: &(dyn Fn() -> f64 + Sync)) -> Result<Trial, LogError> {
+        let names = |effects: &[Concealed]| effects.iter().map(|effect| effect.id.clone()).collect::<Vec<String>>();
+        match self {
+            Self::Joint(case) => {
+                let names = names(&case.label.effects);
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                Ok(joint::given(case).tried(&names, joint::regression(case), clock))
+            }
+            Self::Trading(case) => {
+                let names = names(&case.label.effects);
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                let given = trading::given(case)?;
+                let regression = trading::regression(&given.train[0]);
+                Ok(given.tried(&names, regression, clock))
+            }
+        }
     }
 }

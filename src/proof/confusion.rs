@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::score::{Entry, Method};
-use crate::conceal::benchmark::Kind;
+use crate::conceal::Kind;
 
 /// Counts of answers by truth.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,8 +62,8 @@ const NOT_EXCITED: &str = "not excited";
 const OUTSIDE: &str = "outside the library";
 
 fn truth(entry: &Entry) -> Option<String> {
-    match entry.label.kind {
-        Kind::Single => entry.label.effects.first().map(|effect| effect.id.clone()),
+    match entry.truth.kind {
+        Kind::Single => entry.truth.effects.first().map(|effect| effect.id.clone()),
         Kind::Pair => None,
         Kind::Null(_) => Some(NOTHING.to_owned()),
         Kind::Outside => Some(OUTSIDE.to_owned()),

@@ -70,7 +70,7 @@ pub enum Standing {
 
 impl Goal {
     /// At least so much, and rather more: a goal whose aim is lower than its least wants a small figure.
-    pub(super) fn new(least: f64, aim: f64) -> Self {
+    pub(super) const fn new(least: f64, aim: f64) -> Self {
         Self { least, aim, until: None }
     }
 

@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::domain::Domain;
 use super::score::Entry;
 use super::seal::{Sealed, seal};
 use super::trial::Trial;
+use super::truth::Truth;
 
 /// The schema the first line names.
 pub const JOURNAL: &str = "trueup.proof-cases/1";
@@ -14,8 +16,8 @@ pub const JOURNAL: &str = "trueup.proof-cases/1";
 pub struct Header {
     /// [`JOURNAL`].
     pub schema: String,
-    /// `robot`.
-    pub domain: String,
+    /// What the cases are of.
+    pub domain: Domain,
     /// The seed all cases are drawn from.
     pub seed: u64,
     /// How many they are.
@@ -104,9 +106,9 @@ impl Journal {
     /// A label that is sealed and yet none.
     pub fn entries(&self) -> Result<Vec<Entry>, JournalError> {
         let entry = |(number, line): (usize, &Line)| {
-            let label = serde_json::from_str(&line.label);
-            let label = label.map_err(|error| JournalError::Line { line: number + 2, what: error.to_string() })?;
-            Ok(Entry { label, trial: line.trial.clone() })
+            let truth = Truth::of(self.header.domain, &line.label);
+            let truth = truth.map_err(|error| JournalError::Line { line: number + 2, what: error.to_string() })?;
+            Ok(Entry { truth, trial: line.trial.clone() })
         };
         self.lines.iter().enumerate().map(entry).collect()
     }
@@ -141,21 +143,21 @@ impl Line {
 #[cfg(test)]
 mod tests {
     use super::super::score::tests::entry;
+    use super::super::truth::tests::joint_label;
     use super::*;
-    use crate::conceal::benchmark::Kind;
+    use crate::conceal::Kind;
     use crate::sim2real::Seed;
     use crate::sim2real::diagnose::Verdict;
 
     fn journal(cases: usize) -> (String, Vec<Line>) {
         let lines: Vec<Line> = (0..cases)
             .map(|index| {
-                let mut entry = entry(Kind::Single, &[("bias", 5.0 / 3.0)], Verdict::Named, &[("bias", 0.9)]);
-                entry.label.index = index;
-                Line::new(index, &Sealed::new(&entry.label, Seed(7)).unwrap(), entry.trial)
+                let entry = entry(Kind::Single, &[("bias", 5.0)], Verdict::Named, &[("bias", 0.9)]);
+                Line::new(index, &Sealed::new(&joint_label(index), index, Seed(7)).unwrap(), entry.trial)
             })
             .collect();
         let seals = lines.iter().map(|line| seal(&line.salt, &line.label)).collect();
-        let header = Header { schema: JOURNAL.into(), domain: "robot".into(), seed: 7, cases, version: "0".into(), seals };
+        let header = Header { schema: JOURNAL.into(), domain: Domain::Robot, seed: 7, cases, version: "0".into(), seals };
         (header.text().unwrap() + &lines.iter().map(|line| line.text().unwrap()).collect::<String>(), lines)
     }
 
@@ -164,7 +166,7 @@ mod tests {
         let (text, lines) = journal(3);
         let whole = Journal::read(&text).unwrap();
         assert_eq!((&whole.lines, whole.whole), (&lines, text.len()));
-        assert_eq!(whole.entries().unwrap()[2].label.index, 2);
+        assert_eq!(whole.entries().unwrap()[2].truth.index, 2);
         let ends: Vec<usize> = text.match_indices('\n').map(|(at, _)| at + 1).collect();
         for cut in ends[0]..text.len() {
             let read = Journal::read(&text[..cut]).unwrap();

@@ -39,25 +39,31 @@ pub fn figures_table(summary: &Summary) -> String {
 #[must_use]
 pub fn readme(summary: &Summary) -> String {
     let kind = if summary.development { "development" } else { "test" };
+    let told = summary.domain.told();
     let mut text = format!(
-        "# The blind benchmark of joints\n\n\
+        "# The blind benchmark of {title}\n\n\
          Made by `trueup prove --domain {domain} --cases {cases} --seed {seed}` with trueup {version}. {seed} is a {kind} seed: \
          seeds below {TEST_SEEDS} are for development, those from {TEST_SEEDS} on for tests, of which nothing is to be learnt.\n\n\
-         Each case is a joint and its twin, two recordings and a label. Of a hundred, 45 conceal one effect, 20 two, 15 none, 12 \
-         one that no registry has, and 8 one that the recording to learn from does not reach. The generator shares no code with \
-         the plants, states each effect in another form, and integrates at 0.1 ms or finer. An effect's size is what it changes \
-         in the recording beyond what refitting inertia, friction, gravity and initial state could hide, over the noise.\n\n",
+         Each case is {of}, and a label. Of a hundred, 45 conceal one effect, 20 two, 15 none, 12 one that no registry has, and 8 \
+         one that the recording to learn from does not reach. {generator} {sizes}\n\n",
+        title = told.title,
         domain = summary.domain,
         cases = summary.cases,
         seed = summary.seed,
         version = summary.version,
+        of = told.cases,
+        generator = told.generator,
+        sizes = told.sizes,
     );
     text += &figures_table(summary);
-    text += "\n\"Recalibrated only\" is the twin refitted with nothing added; \"sparse regression\" differentiates the smoothed \
-             position and regresses the balance of torques; the \"oracle\" is a fit that is told the names. A diagnosis that is \
-             `unexplained` has no name counted as right, and what is listed as `not_excited` is not named.\n\n\
-             ## The worst answers\n\n\
-             | case | concealed | said | circumstances | recalibrated, trued, oracle [sigma] |\n|---|---|---|---|---|\n";
+    let _ = write!(
+        text,
+        "\n\"Recalibrated only\" is the twin refitted with nothing added; {}; the \"oracle\" is a fit that is told the names. A \
+         diagnosis that is `unexplained` has no name counted as right, and what is listed as `not_excited` is not named.\n\n\
+         ## The worst answers\n\n\
+         | case | concealed | said | circumstances | recalibrated, trued, oracle [sigma] |\n|---|---|---|---|---|\n",
+        told.regression
+    );
     for failure in &summary.failures {
         let errors = failure.errors.map(|error| error.map_or_else(|| "\u{2013}".to_owned(), |error| format!("{error:.2}")));
         let _ = writeln!(

@@ -5,14 +5,13 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::trial::{Fitted, finite};
-use crate::robot::{Commands, Joint};
 use crate::sim2real::diagnose::{Calibration, Comparison, Outcome, calibrate, diagnose};
-use crate::sim2real::{Assembly, Candidate, Recording, Seed, Simulator, Thetas, Twin};
+use crate::sim2real::{Assembly, Candidate, Plant, Recording, Seed, Simulator, Thetas, Trajectory, Twin};
 
 /// What the oracle found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OracleFit {
-    /// Root mean square error on the recording to test on [rad].
+    /// Root mean square error on the recording to test on, in the first channel's unit.
     pub held_out: f64,
     /// Parameters of each mechanism it was told of, in their order.
     pub parameters: Vec<BTreeMap<String, Fitted>>,
@@ -30,18 +29,19 @@ type Attempt = (f64, OracleFit);
 /// Fits `twin` with exactly the mechanisms `names`, each in its best form; what fits the recording to learn from best is
 /// kept. None where the registry lacks a name; with no names the twin is recalibrated.
 ///
-/// It has three ways to go about it: what the diagnosis found, where it named just these; a diagnosis that knows no other
+/// Its error is that of `channel`. It has three ways to go about it: what the diagnosis found, where it named just these; a diagnosis that knows no other
 /// names; and where that does not come to all of them, fits from the mechanisms' own starts.
-pub(super) fn oracle(
-    twin: &Assembly<Joint>,
-    train: &[Recording<Commands>],
-    test: &[Recording<Commands>],
+pub(super) fn oracle<P: Plant>(
+    twin: &Assembly<P>,
+    train: &[Recording<P::Stimulus>],
+    test: &[Recording<P::Stimulus>],
     names: &[&str],
-    diagnosed: &Outcome<Assembly<Joint>>,
+    channel: &str,
+    diagnosed: &Outcome<Assembly<P>>,
 ) -> Option<OracleFit> {
     let bare = calibrate(twin, train, test, Seed(0), &|_, _, _| {});
     if names.is_empty() {
-        return Some(OracleFit { held_out: held_out(&bare), parameters: Vec::new() });
+        return Some(OracleFit { held_out: held_out(&bare, channel), parameters: Vec::new() });
     }
     let known: Vec<String> = twin.registry().iter().map(|row| row.about().name.to_owned()).collect();
     if !names.iter().all(|name| known.iter().any(|known| known == name)) {
@@ -49,35 +49,37 @@ pub(super) fn oracle(
     }
     let others: Vec<String> = known.into_iter().filter(|known| !names.contains(&known.as_str())).collect();
     let told = diagnose(&twin.clone().excluding(&others), train, test, Seed(0), &|_, _, _| {});
-    let mut attempts: Vec<Attempt> = [diagnosed, &told].into_iter().filter_map(|outcome| as_found(outcome, names)).collect();
-    if as_found(&told, names).is_none() {
-        attempts.extend(as_fitted(twin, train, test, names, &bare));
+    let mut attempts: Vec<Attempt> =
+        [diagnosed, &told].into_iter().filter_map(|outcome| as_found(outcome, names, channel)).collect();
+    if as_found(&told, names, channel).is_none() {
+        attempts.extend(as_fitted(twin, train, test, names, channel, &bare));
     }
     attempts.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, fit)| fit)
 }
 
 /// What a diagnosis found, where it named all of `names` and no other.
-fn as_found(outcome: &Outcome<Assembly<Joint>>, names: &[&str]) -> Option<Attempt> {
+fn as_found<P: Plant>(outcome: &Outcome<Assembly<P>>, names: &[&str], channel: &str) -> Option<Attempt> {
     let effects = &outcome.diagnosis.effects;
     let parameters = names.iter().map(|name| {
         let effect = effects.iter().find(|effect| effect.mechanism == *name)?;
         Some(effect.parameters.iter().map(|(name, estimate)| (name.clone(), Fitted::from(estimate))).collect())
     });
     let parameters: Vec<BTreeMap<String, Fitted>> = parameters.collect::<Option<_>>()?;
-    let held_out = finite(outcome.diagnosis.fit.first()?.trued_rmse);
+    let held_out = finite(outcome.diagnosis.fit.iter().find(|fit| fit.channel == channel)?.trued_rmse);
     let exact = effects.len() == names.len();
     exact.then(|| (learnt(&outcome.comparisons, |c| &c.trued), OracleFit { held_out, parameters }))
 }
 
 /// Fits from the starts that come nearest before anything is fitted.
-fn as_fitted(
-    twin: &Assembly<Joint>,
-    train: &[Recording<Commands>],
-    test: &[Recording<Commands>],
+fn as_fitted<P: Plant>(
+    twin: &Assembly<P>,
+    train: &[Recording<P::Stimulus>],
+    test: &[Recording<P::Stimulus>],
     names: &[&str],
+    channel: &str,
     bare: &Calibration,
 ) -> Vec<Attempt> {
-    let mut starts: Vec<Start> = Vec::new();
+    let mut starts: Vec<Start<P>> = Vec::new();
     for choice in choices(&twin.candidates(train), names) {
         let with = choice.iter().fold(twin.clone(), |twin, candidate| twin.with(candidate));
         let mut tried = started(&with, &choice, &bare.values, &train[0]);
@@ -85,7 +87,7 @@ fn as_fitted(
         starts.extend(tried.into_iter().take(FOLLOWED).map(|(error, values)| (error, with.clone(), choice.clone(), values)));
     }
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let fit = |(_, with, choice, values): Start| {
+    let fit = |(_, with, choice, values): Start<P>| {
         let point: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).chain(values).collect();
         let fit = calibrate(&with.with_values(&point), train, test, Seed(0), &|_, _, _| {});
         let mut at = twin.parameters().len();
@@ -97,13 +99,13 @@ fn as_fitted(
             named.map(|(k, parameter)| (parameter.name.clone().into_owned(), fitted(from + k))).collect()
         });
         let parameters = parameters.collect();
-        (learnt(&fit.comparisons, |c| &c.recalibrated), OracleFit { held_out: held_out(&fit), parameters })
+        (learnt(&fit.comparisons, |c| &c.recalibrated), OracleFit { held_out: held_out(&fit, channel), parameters })
     };
     starts.into_iter().take(FITS).map(fit).collect()
 }
 
 /// Error at a start, the twin, its mechanisms and the values of their parameters there.
-type Start = (f64, Assembly<Joint>, Vec<Candidate>, Vec<f64>);
+type Start<P> = (f64, Assembly<P>, Vec<Candidate>, Vec<f64>);
 
 /// All choices of one form for each name; none where a name has none.
 fn choices(candidates: &[Candidate], names: &[&str]) -> Vec<Vec<Candidate>> {
@@ -115,11 +117,11 @@ fn choices(candidates: &[Candidate], names: &[&str]) -> Vec<Vec<Candidate>> {
 }
 
 /// Starts of the mechanisms' parameters, each with how far the twin is off there before anything is fitted.
-fn started(
-    twin: &Assembly<Joint>,
+fn started<P: Plant>(
+    twin: &Assembly<P>,
     choice: &[Candidate],
     plant: &[f64],
-    recording: &Recording<Commands>,
+    recording: &Recording<P::Stimulus>,
 ) -> Vec<(f64, Vec<f64>)> {
     let mut points: Vec<Vec<f64>> = vec![Vec::new()];
     for parameter in choice.iter().flat_map(|candidate| &candidate.form.parameters) {
@@ -132,24 +134,32 @@ fn started(
     let initial: Vec<f64> = twin.initial_parameters(recording, 0).iter().map(|p| p.nominal).collect();
     let lanes: Vec<Vec<f64>> = points.iter().map(|point| [plant, point, &initial].concat()).collect();
     let runs = twin.rollout(&Thetas::from_lanes(&lanes), recording, 0..recording.len(), Seed(0));
-    let measured = recording.measured.first().map(|measured| measured.samples.as_slice()).unwrap_or_default();
-    let error = |run: &[f64]| -> f64 {
-        let squares = run.iter().zip(measured).filter_map(|(run, measured)| Some((run - (*measured)?).powi(2)));
-        finite(squares.sum())
+    let error = |run: &Trajectory| -> f64 {
+        let channels = recording.measured.iter().filter_map(|measured| {
+            let simulated = run.iter().find(|simulated| simulated.channel == measured.channel)?;
+            Some(misfit(&measured.samples, &simulated.samples))
+        });
+        finite(channels.sum())
     };
-    runs.iter().zip(points).filter_map(|(run, point)| Some((error(&run.first()?.samples), point))).collect()
+    runs.iter().zip(points).map(|(run, point)| (error(run), point)).collect()
 }
 
-fn held_out(calibration: &Calibration) -> f64 {
-    finite(calibration.fit.first().map_or(f64::INFINITY, |fit| fit.recalibrated_rmse))
+/// Squared error over the mean square of what was measured, so that channels of several units can be added up.
+fn misfit(measured: &[Option<f64>], simulated: &[f64]) -> f64 {
+    let pairs = measured.iter().zip(simulated).filter_map(|(measured, simulated)| Some(((*measured)?, *simulated)));
+    let (errors, squares, count) = pairs.fold((0.0, 0.0, 0.0), |(errors, squares, count), (measured, simulated)| {
+        (errors + (measured - simulated).powi(2), squares + measured.powi(2), count + 1.0)
+    });
+    if squares > 0.0 { count * errors / squares } else { errors }
 }
 
-/// Squared error on what was fitted.
+fn held_out(calibration: &Calibration, channel: &str) -> f64 {
+    let fit = calibration.fit.iter().find(|fit| fit.channel == channel);
+    finite(fit.map_or(f64::INFINITY, |fit| fit.recalibrated_rmse))
+}
+
+/// How far all channels are off on what was fitted.
 fn learnt(comparisons: &[Comparison], of: impl Fn(&Comparison) -> &Vec<f64>) -> f64 {
     let fitted = comparisons.iter().filter(|comparison| !comparison.held_out);
-    let squares = fitted.flat_map(|comparison| {
-        let pairs = comparison.measured.iter().zip(of(comparison));
-        pairs.filter_map(|(measured, simulated)| Some(((*measured)? - simulated).powi(2)))
-    });
-    finite(squares.sum())
+    finite(fitted.map(|comparison| misfit(&comparison.measured, of(comparison))).sum())
 }

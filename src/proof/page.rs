@@ -47,17 +47,18 @@ impl Summary {
 
     fn about(&self) -> Vec<String> {
         let kind = if self.development { "development" } else { "test" };
+        let told = self.domain.told();
         vec![
             format!(
-                "Joints of every kind, each with a twin whose parameters are off, and with something concealed, or nothing: 45 in \
-                 a hundred hold one effect, 20 two, 15 none, 12 one that no registry has, 8 one that the recording does not \
-                 reach. Labels were sealed before the first diagnosis; together their seal is {}.",
+                "Each case is {}, with something concealed, or nothing: 45 in a hundred hold one effect, 20 two, 15 none, 12 one \
+                 that no registry has, 8 one that the recording does not reach. Labels were sealed before the first diagnosis; \
+                 together their seal is {}.",
+                told.cases,
                 &self.seal[..16.min(self.seal.len())]
             ),
             format!(
-                "Seed {}, a {kind} seed: those below {TEST_SEEDS} are for development. Sizes are in standard deviations of the \
-                 noise, of what refitting could not hide.",
-                self.seed
+                "Seed {}, a {kind} seed: those below {TEST_SEEDS} are for development. {} {}",
+                self.seed, told.generator, told.sizes
             ),
         ]
     }

@@ -61,7 +61,7 @@ impl Reliability {
 mod tests {
     use super::super::score::tests::entry;
     use super::*;
-    use crate::conceal::benchmark::Kind;
+    use crate::conceal::Kind;
     use crate::sim2real::diagnose::Verdict;
 
     #[test]

@@ -1,14 +1,15 @@
 //! What counts as right.
 
 use super::trial::Trial;
-use crate::conceal::benchmark::{Concealed, Kind, Label};
+use super::truth::Truth;
+use crate::conceal::{Concealed, Kind};
 use crate::sim2real::diagnose::Verdict;
 
 /// A case unsealed: the truth beside what was said.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
     /// The truth.
-    pub label: Label,
+    pub truth: Truth,
     /// What was said.
     pub trial: Trial,
 }
@@ -68,7 +69,7 @@ impl Entry {
 
     /// Whether a name is neither right nor wrong here.
     pub(super) fn tolerates(&self, name: &str) -> bool {
-        self.label.tolerated.iter().any(|tolerated| tolerated == name) && !self.conceals(name)
+        self.truth.tolerated.iter().any(|tolerated| tolerated == name) && !self.conceals(name)
     }
 
     /// Whether a name is among what was concealed.
@@ -78,25 +79,25 @@ impl Entry {
 
     /// The concealed effect of that name.
     pub(super) fn concealed(&self, name: &str) -> Option<&Concealed> {
-        self.label.effects.iter().find(|effect| effect.id == name)
+        self.truth.effects.iter().find(|effect| effect.id == name)
     }
 
     /// The smallest size of what is concealed; 0 where nothing is.
     pub(super) fn size(&self) -> f64 {
-        let known = self.label.effects.iter().map(|effect| effect.size);
-        let all = known.chain(self.label.outside.as_ref().map(|(_, size)| *size));
+        let known = self.truth.effects.iter().map(|effect| effect.size);
+        let all = known.chain(self.truth.outside.as_ref().map(|(_, size)| *size));
         let smallest = all.fold(f64::INFINITY, f64::min);
         if smallest.is_finite() { smallest } else { 0.0 }
     }
 
     /// Whether it holds one effect, of a size between the two.
     pub(super) fn single(&self, from: f64, to: f64) -> bool {
-        self.label.kind == Kind::Single && (from..to).contains(&self.size())
+        self.truth.kind == Kind::Single && (from..to).contains(&self.size())
     }
 
     /// Whether it holds two effects, both of a size that must be seen.
     pub(super) fn clear_pair(&self) -> bool {
-        self.label.kind == Kind::Pair && self.size() >= CLEAR
+        self.truth.kind == Kind::Pair && self.size() >= CLEAR
     }
 
     /// The name most certain is the one concealed, and nothing else is said to be missing.
@@ -111,8 +112,8 @@ impl Entry {
 
     /// Exactly what was concealed is named.
     pub(super) fn exact(&self, answer: &Answer) -> bool {
-        let all = self.label.effects.iter().all(|effect| answer.names.contains(&effect.id));
-        !answer.unknown && all && answer.names.len() == self.label.effects.len()
+        let all = self.truth.effects.iter().all(|effect| answer.names.contains(&effect.id));
+        !answer.unknown && all && answer.names.len() == self.truth.effects.len()
     }
 
     /// It is said that something unknown is missing; of what is too small to be seen, nothing need be said.
@@ -124,13 +125,16 @@ impl Entry {
     #[must_use]
     pub fn right(&self) -> bool {
         let answer = self.answer(Method::Diagnosis);
-        match self.label.kind {
+        match self.truth.kind {
             Kind::Single => self.right_first(&answer),
             Kind::Pair => self.exact(&answer),
             Kind::Null(_) => answer.names.is_empty() && !answer.unknown,
             Kind::Outside => self.said_so(&answer),
-            // It need not be seen; what is there may be.
-            Kind::NotExcited => !answer.unknown && answer.names.iter().all(|name| self.conceals(name)),
+            // It need not be seen; what is there may be, and so may what cannot be told from it.
+            Kind::NotExcited => {
+                let listed = self.trial.verdict == Verdict::Ambiguous && self.right_or_rival(&answer);
+                !answer.unknown && (listed || answer.names.iter().all(|name| self.conceals(name)))
+            }
         }
     }
 
@@ -155,7 +159,7 @@ pub(super) mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::conceal::benchmark::{Arm, Null};
+    use crate::conceal::Null;
     use crate::proof::trial::{Found, HeldOut};
 
     pub(in crate::proof) fn entry(kind: Kind, truth: &[(&str, f64)], verdict: Verdict, said: &[(&str, f64)]) -> Entry {
@@ -177,18 +181,15 @@ pub(super) mod tests {
         });
         let outside = kind == Kind::Outside;
         Entry {
-            label: Label {
+            truth: Truth {
                 index: 0,
                 kind,
                 outside: outside.then(|| (truth[0].0.to_owned(), truth[0].1)),
                 effects: if outside { Vec::new() } else { effects.collect() },
                 tolerated: vec!["quantization".to_owned()],
-                arm: Arm { linear: false, inertia: 0.1, viscous_friction: 0.2, gravity_torque: 2.0, gain: 1.0 },
-                nominal: [0.1, 0.2, 2.0, 1.0],
                 noise: 1e-3,
-                noise_kind: "white".to_owned(),
-                snr: 30.0,
-                excitation: ["multisine".to_owned(), "chirp".to_owned()],
+                circumstances: String::new(),
+                poor: false,
             },
             trial: Trial {
                 verdict,
@@ -249,6 +250,8 @@ pub(super) mod tests {
         assert!(hardly(Verdict::Named, &[("bias", 0.9)]).right());
         assert!(!hardly(Verdict::Named, &[("drift", 0.9)]).right());
         assert!(!hardly(Verdict::Unexplained, &[]).right());
+        assert!(hardly(Verdict::Ambiguous, &[("drift", 0.5), ("bias", 0.4)]).right(), "it is among what it may be");
+        assert!(!hardly(Verdict::Ambiguous, &[("drift", 0.5), ("scale", 0.4)]).right());
     }
 
     #[test]

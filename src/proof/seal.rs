@@ -1,8 +1,8 @@
 //! Seals: a label is fixed by its hash before its case is diagnosed, and shown after.
 
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::conceal::benchmark::Label;
 use crate::sim2real::Seed;
 
 /// A label as text, and what seals it.
@@ -17,12 +17,12 @@ pub struct Sealed {
 }
 
 impl Sealed {
-    /// Seals the label of a case of `seed`.
+    /// Seals the label of case `index` of `seed`.
     ///
     /// # Errors
     /// None but a bug: a label is always JSON.
-    pub fn new(label: &Label, seed: Seed) -> Result<Self, serde_json::Error> {
-        let salt = hexadecimal(&Sha256::digest(format!("salt of case {} of seed {}", label.index, seed.0)));
+    pub fn new(label: &impl Serialize, index: usize, seed: Seed) -> Result<Self, serde_json::Error> {
+        let salt = hexadecimal(&Sha256::digest(format!("salt of case {index} of seed {}", seed.0)));
         let salt = salt[..32].to_owned();
         let label = serde_json::to_string(label)?;
         Ok(Self { seal: seal(&salt, &label), label, salt })

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::confusion::Confusion;
+use super::domain::Domain;
 use super::figure::Figure;
 use super::journal::{Journal, JournalError};
 use super::reliability::Reliability;
@@ -21,8 +22,8 @@ pub const TEST_SEEDS: u64 = 1_000;
 pub struct Summary {
     /// [`SUMMARY`].
     pub schema: String,
-    /// `robot`.
-    pub domain: String,
+    /// What the cases are of.
+    pub domain: Domain,
     /// The seed all cases were drawn from.
     pub seed: u64,
     /// Whether it is one of those that the program may be developed on.
@@ -52,7 +53,7 @@ pub struct Failure {
     pub truth: String,
     /// What was said.
     pub said: String,
-    /// What makes the case what it is: arm, noise, motion.
+    /// What makes the case what it is, in words.
     pub circumstances: String,
     /// Held-out errors over the noise: recalibrated, trued, and the oracle's where there is one.
     pub errors: [Option<f64>; 3],
@@ -72,13 +73,13 @@ impl Summary {
         let header = &journal.header;
         Ok(Self {
             schema: SUMMARY.to_owned(),
-            domain: header.domain.clone(),
+            domain: header.domain,
             seed: header.seed,
             development: header.seed < TEST_SEEDS,
             cases: header.cases,
             version: header.version.clone(),
             seal: seal_of_all(&header.seals),
-            figures: figures(&entries, &reliability),
+            figures: figures(header.domain, &entries, &reliability),
             confusion: Confusion::of(&entries),
             reliability,
             failures: failures(&entries),
@@ -88,32 +89,24 @@ impl Summary {
 
 fn failures(entries: &[Entry]) -> Vec<Failure> {
     let mut wrong: Vec<(f64, &Entry)> = entries.iter().map(|e| (e.severity(), e)).filter(|(s, _)| *s > 0.0).collect();
-    wrong.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.label.index.cmp(&b.1.label.index)));
+    wrong.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.truth.index.cmp(&b.1.truth.index)));
     wrong.into_iter().take(TOLD).map(|(_, entry)| failure(entry)).collect()
 }
 
 fn failure(entry: &Entry) -> Failure {
-    let (label, trial) = (&entry.label, &entry.trial);
+    let (truth, trial) = (&entry.truth, &entry.trial);
     let sized = |id: &str, size: f64| format!("{id} ({size:.1} sigma)");
-    let outside = label.outside.iter().map(|(id, size)| format!("outside: {}", sized(id, *size)));
-    let truth: Vec<String> = label.effects.iter().map(|effect| sized(&effect.id, effect.size)).chain(outside).collect();
+    let outside = truth.outside.iter().map(|(id, size)| format!("outside: {}", sized(id, *size)));
+    let concealed: Vec<String> = truth.effects.iter().map(|effect| sized(&effect.id, effect.size)).chain(outside).collect();
     let names = entry.answer(Method::Diagnosis).names;
     let found = trial.found.iter().filter(|found| names.contains(&found.mechanism));
     let found: Vec<String> = found.map(|found| format!("{} {:.2}", found.mechanism, found.confidence)).collect();
-    let axis = match (label.arm.linear, label.arm.gravity_torque == 0.0) {
-        (true, _) => "linear axis",
-        (false, true) => "arm without gravity",
-        (false, false) => "arm",
-    };
-    let ratio = |error: f64| Some(error / label.noise).filter(|ratio| ratio.is_finite());
+    let ratio = |error: f64| Some(error / truth.noise).filter(|ratio| ratio.is_finite());
     Failure {
-        index: label.index,
-        truth: if truth.is_empty() { "nothing".to_owned() } else { truth.join(" and ") },
+        index: truth.index,
+        truth: if concealed.is_empty() { "nothing".to_owned() } else { concealed.join(" and ") },
         said: if found.is_empty() { trial.verdict.to_string() } else { format!("{}: {}", trial.verdict, found.join(", ")) },
-        circumstances: format!(
-            "{axis}, {:.0} dB, noise {}, {} then {}",
-            label.snr, label.noise_kind, label.excitation[0], label.excitation[1]
-        ),
+        circumstances: truth.circumstances.clone(),
         errors: [
             ratio(trial.held_out.recalibrated),
             ratio(trial.held_out.trued),

@@ -4,12 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::case::{recordings, twin};
 use super::oracle::{OracleFit, oracle};
-use super::regression::regression;
-use crate::conceal::benchmark::{Case, Span};
-use crate::sim2real::Seed;
+use crate::conceal::Span;
 use crate::sim2real::diagnose::{Diagnosis, Effect, Estimate, Verdict, diagnose};
+use crate::sim2real::{Assembly, Plant, Recording, Seed};
 
 /// What was said of a case, and what the baselines said.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,11 +23,11 @@ pub struct Trial {
     pub onset: Option<f64>,
     /// Where, in the recording to learn from.
     pub intervals: Vec<Span>,
-    /// Root mean square errors on the recording to test on [rad].
+    /// Root mean square errors on the recording to test on, in the unit of the channel that is told.
     pub held_out: HeldOut,
     /// The fit that was told the names; none where the registry lacks one of them.
     pub oracle: Option<OracleFit>,
-    /// The names that sparse regression on differentiated positions gives.
+    /// The names that linear regression gives: on differentiated positions, or on what costs are usually put down to.
     pub regression: Vec<String>,
     /// How long the diagnosis took [s], other cases under way beside it.
     pub seconds: f64,
@@ -77,27 +75,36 @@ pub struct HeldOut {
     pub trued: f64,
 }
 
-/// Diagnoses a case without a look at its label; the oracle alone is told, and only then. `clock` gives a time [s].
-#[must_use]
-pub fn tried(case: &Case, clock: &(dyn Fn() -> f64 + Sync)) -> Trial {
-    let twin = twin(case);
-    let [train, test] = recordings(case).map(|recording| [recording]);
-    let began = clock();
-    let outcome = diagnose(&twin, &train, &test, Seed(0), &|_, _, _| {});
-    let seconds = clock() - began;
-    let names: Vec<&str> = case.label.effects.iter().map(|effect| effect.id.as_str()).collect();
-    let oracle = oracle(&twin, &train, &test, &names, &outcome);
-    let diagnosis = outcome.diagnosis;
-    Trial {
-        verdict: diagnosis.verdict,
-        remainder: finite(diagnosis.checks.remainder),
-        onset: diagnosis.location.onset,
-        intervals: intervals(&diagnosis, &train[0].name),
-        held_out: held_out(&diagnosis),
-        oracle,
-        regression: regression(case),
-        found: diagnosis.effects.into_iter().map(|effect| found(effect, &train[0].name)).collect(),
-        seconds,
+/// What a diagnosis is given of a case: a twin, a recording to learn from, and one to test on.
+pub(super) struct Given<P: Plant> {
+    pub twin: Assembly<P>,
+    pub train: [Recording<P::Stimulus>; 1],
+    pub test: [Recording<P::Stimulus>; 1],
+    /// The channel whose errors are told.
+    pub channel: &'static str,
+}
+
+impl<P: Plant> Given<P> {
+    /// Diagnoses it; the oracle alone is told the `names`, and only then. `regression` is what the baseline names, and `clock`
+    /// gives a time [s].
+    pub fn tried(&self, names: &[&str], regression: Vec<String>, clock: &(dyn Fn() -> f64 + Sync)) -> Trial {
+        let Self { twin, train, test, channel } = self;
+        let began = clock();
+        let outcome = diagnose(twin, train, test, Seed(0), &|_, _, _| {});
+        let seconds = clock() - began;
+        let oracle = oracle(twin, train, test, names, channel, &outcome);
+        let diagnosis = outcome.diagnosis;
+        Trial {
+            verdict: diagnosis.verdict,
+            remainder: finite(diagnosis.checks.remainder),
+            onset: diagnosis.location.onset,
+            intervals: intervals(&diagnosis, &train[0].name),
+            held_out: held_out(&diagnosis, channel),
+            oracle,
+            regression,
+            found: diagnosis.effects.into_iter().map(|effect| found(effect, &train[0].name)).collect(),
+            seconds,
+        }
     }
 }
 
@@ -125,9 +132,9 @@ fn intervals(diagnosis: &Diagnosis, recording: &str) -> Vec<Span> {
     own.map(|interval| Span { start: interval.start, end: interval.end }).collect()
 }
 
-fn held_out(diagnosis: &Diagnosis) -> HeldOut {
-    let errors =
-        diagnosis.fit.first().map_or([f64::MAX; 3], |fit| [fit.nominal_rmse, fit.recalibrated_rmse, fit.trued_rmse]);
+fn held_out(diagnosis: &Diagnosis, channel: &str) -> HeldOut {
+    let fit = diagnosis.fit.iter().find(|fit| fit.channel == channel);
+    let errors = fit.map_or([f64::MAX; 3], |fit| [fit.nominal_rmse, fit.recalibrated_rmse, fit.trued_rmse]);
     let [nominal, recalibrated, trued] = errors.map(finite);
     HeldOut { nominal, recalibrated, trued }
 }

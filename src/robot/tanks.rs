@@ -83,7 +83,7 @@ impl Tanks {
                 if name == "pump_gain" { parameter } else { parameter.within(0.0, f64::INFINITY) }
             })
             .collect();
-        let channels = vec![Channel { name: "level".into(), unit: unit.to_owned().into() }];
+        let channels = vec![Channel { name: "level".into(), unit: unit.to_owned().into(), exact: false }];
         Self { channels, parameters, longest_step }
     }
 

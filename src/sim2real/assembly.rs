@@ -204,6 +204,10 @@ impl<P: Plant> Simulator for Assembly<P> {
         self.plant.covariates(recording)
     }
 
+    fn aspects(&self, recording: &Recording<P::Stimulus>) -> Vec<Recording<P::Stimulus>> {
+        self.plant.aspects(recording)
+    }
+
     fn notes(&self, recording: &Recording<P::Stimulus>) -> Vec<String> {
         self.plant.notes(recording)
     }
@@ -305,7 +309,10 @@ impl<P: Plant> Twin for Assembly<P> {
                 continue;
             }
             for (form_index, form) in mechanism.sought(&typical).into_iter().enumerate() {
-                let known = recordings.iter().all(|r| mechanism.applies(form_index, &self.plant, &r.stimulus));
+                let applies = |stimulus| {
+                    self.plant.concerns(about.site, stimulus) && mechanism.applies(form_index, &self.plant, stimulus)
+                };
+                let known = recordings.iter().all(|r| applies(&r.stimulus));
                 if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
                     let finishing = mechanism.finishing(form_index);
                     candidates.push(Candidate { about, form, form_index, finishing });

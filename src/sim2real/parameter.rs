@@ -83,7 +83,8 @@ impl Parameter {
         self
     }
 
-    /// Says that its effect grows in proportion to it, where it is small.
+    /// Says that its effect grows in proportion to it, where it is small. Whether recordings would show it is judged by its first
+    /// start, which should be as large as it may well be.
     #[must_use]
     pub fn proportional(mut self) -> Self {
         self.linear = true;

@@ -80,13 +80,22 @@ pub struct Channel {
     pub name: Cow<'static, str>,
     /// Unit.
     pub unit: Cow<'static, str>,
+    /// Whether it has no noise but the rounding of what it tells: what a rule charges, or a count.
+    pub exact: bool,
 }
 
 impl Channel {
     /// A channel of that name and unit.
     #[must_use]
     pub const fn new(name: &'static str, unit: &'static str) -> Self {
-        Self { name: Cow::Borrowed(name), unit: Cow::Borrowed(unit) }
+        Self { name: Cow::Borrowed(name), unit: Cow::Borrowed(unit), exact: false }
+    }
+
+    /// The same without noise.
+    #[must_use]
+    pub const fn exact(mut self) -> Self {
+        self.exact = true;
+        self
     }
 }
 
@@ -137,6 +146,15 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     /// What was left out or is peculiar about `recording`, in words a report can show.
     fn notes(&self, _recording: &Recording<Self::Stimulus>) -> Vec<String> {
         Vec::new()
+    }
+    /// What a recording shows that no mechanism has in common: recordings of their own, each with channels of its own, which are
+    /// diagnosed one by one. None where it shows but one thing.
+    fn aspects(&self, _recording: &Recording<Self::Stimulus>) -> Vec<Recording<Self::Stimulus>> {
+        Vec::new()
+    }
+    /// Whether mechanisms of that site may change anything of what a recording driven by `stimulus` shows.
+    fn concerns(&self, _site: Site, _stimulus: &Self::Stimulus) -> bool {
+        true
     }
     /// Whether mechanisms of that site have something to act on: equations that do not say what moves have no place for
     /// friction.

@@ -32,6 +32,11 @@ pub trait Simulator: Send + Sync {
     fn covariates(&self, recording: &Recording<Self::Stimulus>) -> Vec<Covariate>;
     /// What was left out or is peculiar about `recording`, in words a report can show.
     fn notes(&self, recording: &Recording<Self::Stimulus>) -> Vec<String>;
+    /// What a recording shows that nothing a twin could lack has in common: recordings of their own, each with channels of its own,
+    /// as many of every recording. None where it shows but one thing.
+    fn aspects(&self, _recording: &Recording<Self::Stimulus>) -> Vec<Recording<Self::Stimulus>> {
+        Vec::new()
+    }
     /// The unit a parameter has here, where mechanisms declare one in general terms.
     fn unit(&self, declared: &str) -> String;
     /// Follows `rows` of `recording` over all lanes of `thetas`: [`Simulator::parameters`] first, then

@@ -149,6 +149,7 @@ pub fn servo_diagnosis(recording: &str) -> Diagnosis {
                 share_of_error: 0.71,
                 share_of_rows: 0.17,
             }],
+            ..Where::default()
         },
         parameters: BTreeMap::from([
             change("inertia", 0.11, 0.104_21, 0.0004, "kg m^2"),

@@ -8,7 +8,7 @@ use crate::cli::screen::{Screen, titled};
 use crate::report::quantity::{
     UNDEFINED, axis, confidence, decimals, number, percent, percents, range, significant, uncertain, with_unit,
 };
-use crate::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, Score};
+use crate::sim2real::diagnose::{ChannelFit, Diagnosis, Effect, RecordingError, Score};
 
 /// Mechanisms of each stage that the ranking tells.
 const RANKED: usize = 6;
@@ -29,6 +29,9 @@ pub(super) fn diagnosis(screen: &Screen, diagnosis: &Diagnosis) -> String {
         text += &format!("\nWhere the refitted twin errs, before anything is named\n\n{place}");
     }
     text += &titled(&format!("Errors on held-out data ({})", diagnosis.held_out), &errors(screen, &diagnosis.fit));
+    if !diagnosis.location.recordings.is_empty() {
+        text += &titled("The same, recording by recording", &by_recording(screen, &diagnosis.location.recordings));
+    }
     if !diagnosis.parameters.is_empty() {
         text += &titled("Parameters of the twin", &parameters(screen, diagnosis));
     }
@@ -113,6 +116,23 @@ pub(in crate::cli) fn errors(screen: &Screen, fits: &[ChannelFit]) -> Table {
             number(fit.trued_mae),
             String::new(),
             String::new(),
+        ]);
+    }
+    table
+}
+
+fn by_recording(screen: &Screen, errors: &[RecordingError]) -> Table {
+    let heads = ["recording", "channel", ">share of error", ">RMS as given", ">recalibrated", ">trued", ">rows"];
+    let mut table = screen.table(heads);
+    for error in errors {
+        table.add_row([
+            error.recording.clone(),
+            axis(&error.channel, &error.unit),
+            percent(error.share_of_error),
+            number(error.nominal_rmse),
+            number(error.recalibrated_rmse),
+            number(error.trued_rmse),
+            error.rows.to_string(),
         ]);
     }
     table

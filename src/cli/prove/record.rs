@@ -95,8 +95,14 @@ fn read(path: &Path) -> Result<Journal, InputError> {
 
 /// What tells a record from the one that is asked for.
 fn other(path: &Path, found: &Header, wanted: &Header) -> InputError {
-    let again = format!("trueup prove --seed {} --cases {} --resume goes on with it", found.seed, found.cases);
+    let again = format!(
+        "trueup prove --domain {} --seed {} --cases {} --resume goes on with it",
+        found.domain, found.seed, found.cases
+    );
     match () {
+        () if found.domain != wanted.domain => {
+            InputError::new(path, format!("holds cases of another domain: {}", found.domain)).hint(again)
+        }
         () if (found.seed, found.cases) != (wanted.seed, wanted.cases) => {
             InputError::new(path, format!("holds {} cases of seed {}", found.cases, found.seed)).hint(again)
         }

@@ -7,15 +7,15 @@ use rand_distr::{Distribution, StandardNormal};
 use super::arm::{Arm, Need, logarithmic, sign};
 use super::effect::Effect;
 use super::excitation::{Excitation, Swing, driven};
-use super::kind::{Kind, Null, null, planned};
-use super::label::{Concealed, Label};
+use super::label::Label;
 use super::motion::{Drive, Machine, Motion, Precision};
 use super::recipe::{FOREIGN, KNOWN, Recipe, UNREACHED, compatible, need};
 use super::scene::Scales;
 use super::sensor::{Noise, Sensor};
 use super::size::{Hideable, strength};
 use super::truth::{self, Met};
-use crate::conceal::{Column, Table};
+use crate::conceal::kind::planned;
+use crate::conceal::{Column, Concealed, Kind, Null, Table};
 use crate::sim2real::Seed;
 
 /// A twin, two recordings, and the truth about them.
@@ -49,6 +49,9 @@ const ATTEMPTS: usize = 80;
 const FURTHEST_OFF: f64 = 0.3;
 /// An effect after which an arm moves this many times as far makes another machine of it.
 const RUNAWAY: f64 = 3.0;
+
+/// Cases without an effect, in turn.
+const NULLS: [Null; 5] = [Null::White, Null::Coloured, Null::Quantized, Null::MisSet, Null::Coarse];
 
 /// What is to be concealed in a case.
 struct Plan {
@@ -93,7 +96,7 @@ impl Plan {
                 let others: Vec<&'static str> = KNOWN.into_iter().filter(|other| compatible(first, other)).collect();
                 Self { kind: Kind::Pair, ids: vec![first, others[rng.random_range(0..others.len())]] }
             }
-            2 => Self { kind: Kind::Null(null(ordinal)), ids: Vec::new() },
+            2 => Self { kind: Kind::Null(NULLS[ordinal % NULLS.len()]), ids: Vec::new() },
             3 => Self { kind: Kind::Outside, ids: vec![dealt(&FOREIGN, "foreign")] },
             _ => Self { kind: Kind::NotExcited, ids: vec![dealt(&UNREACHED, "unreached")] },
         }

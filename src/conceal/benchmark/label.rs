@@ -1,11 +1,9 @@
 //! What a case is told of after its diagnosis, and not before.
 
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
 
 use super::arm::Arm;
-use super::kind::Kind;
+use crate::conceal::{Concealed, Kind};
 
 /// The truth about a case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,29 +30,4 @@ pub struct Label {
     pub snr: f64,
     /// How the arm was moved, in words: to learn from, and to test on.
     pub excitation: [String; 2],
-}
-
-/// One concealed effect.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Concealed {
-    /// The name a right diagnosis says.
-    pub id: String,
-    /// Root mean square, over the rows to learn from, of what it changes and refitting could not hide [noise standard
-    /// deviations].
-    pub size: f64,
-    /// Its true parameters, as far as a registry's of that name can be compared with them.
-    pub parameters: BTreeMap<String, f64>,
-    /// When it began [s], where not from the start: of what takes a while, the middle of that.
-    pub onset: Option<f64>,
-    /// When it acted, in the recording to learn from, where it acts at times only.
-    pub active: Vec<Span>,
-}
-
-/// A stretch of time [s].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Span {
-    /// Its start.
-    pub start: f64,
-    /// Its end.
-    pub end: f64,
 }

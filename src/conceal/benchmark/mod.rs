@@ -9,7 +9,6 @@ mod draw;
 mod driver;
 mod effect;
 mod excitation;
-mod kind;
 mod label;
 mod load;
 mod motion;
@@ -21,8 +20,7 @@ mod truth;
 
 pub use arm::Arm;
 pub use draw::{Case, draw};
-pub use kind::{Kind, MIX, Null};
-pub use label::{Concealed, Label, Span};
+pub use label::Label;
 
 #[cfg(test)]
 mod tests;

@@ -4,8 +4,8 @@ use rand::RngExt;
 use rand_distr::{Distribution, Normal, StandardNormal};
 
 use super::effect::{Effect, Foreign};
-use super::label::Span;
 use super::motion::{Drive, Motion};
+use crate::conceal::Span;
 use crate::sim2real::Seed;
 
 /// How a sensor's noise is made.

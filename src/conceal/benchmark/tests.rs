@@ -1,5 +1,6 @@
-use super::kind::planned;
 use super::*;
+use crate::conceal::Kind;
+use crate::conceal::kind::planned;
 use crate::sim2real::Seed;
 
 fn cases(seed: u64, indices: std::ops::Range<usize>) -> Vec<Case> {

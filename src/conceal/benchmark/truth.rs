@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::effect::Effect;
-use super::label::Span;
 use super::load::PUT_ON;
 use super::motion::{Drive, Machine, Motion};
 use super::scene::Scales;
 use super::sensor::{Sensor, merged};
+use crate::conceal::Span;
 
 /// What an effect met: commands, positions and velocities, row by row.
 pub(super) struct Met {

@@ -29,7 +29,10 @@ impl Mechanism<Execution> for LinearImpact {
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
         Form::only(vec![
-            Parameter::new("bps_at_full_participation", "bps", 0.0).within(0.0, 100_000.0).starting_at(&[10.0, 100.0]),
+            Parameter::new("bps_at_full_participation", "bps", 0.0)
+                .within(0.0, 1e6)
+                .starting_at(&[10_000.0, 1_000.0, 100.0])
+                .proportional(),
         ])
     }
 

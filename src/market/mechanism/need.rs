@@ -18,6 +18,8 @@ pub enum Need {
     DailyVolume,
     /// How much the price moves in a day.
     DailyVolatility,
+    /// How much it has moved in the last minutes.
+    RecentVolatility,
     /// Queues at the prices at which orders rest.
     Queues,
 }
@@ -54,6 +56,7 @@ impl Need {
             Self::Volume => log.knows_volume(),
             Self::DailyVolume => average_daily_volume.is_some(),
             Self::DailyVolatility => daily_volatility.is_some(),
+            Self::RecentVolatility => log.orders().iter().any(|order| order.recent_volatility.is_some_and(|v| v > 0.0)),
             Self::Queues => log.has_a(Role::Maker) && display_sizes(log.tape().quotes()),
         }
     }
@@ -81,6 +84,10 @@ impl Need {
                 "volatilities",
                 "add daily_volatility to [[instrument]], or more than a week of data: it is that of days that are over",
             ),
+            Self::RecentVolatility if !quoted && !has_book && history.prints().is_empty() && coarse(history) => lack(
+                "prices as often as every minute",
+                "add [[data]] with quotes, trades or minute bars, or give `fraction` of the daily volatility",
+            ),
             Self::Queues if !has_book && !display_sizes(history.quotes()) => lack(
                 "sizes displayed at a price",
                 "add [[data]] with a book, or quotes that know sizes; on bars and trades alone nobody knows a queue",
@@ -101,6 +108,11 @@ fn days(history: &History) -> usize {
     days.sort_unstable();
     days.dedup();
     days.len()
+}
+
+/// Whether bars are longer than a minute.
+fn coarse(history: &History) -> bool {
+    history.bars().first().is_none_or(|bar| bar.known_at - bar.open_at > 60 * Timestamp::NANOS)
 }
 
 fn display_sizes(quotes: &Quotes) -> bool {

@@ -4,6 +4,7 @@ use crate::market::{Execution, ExecutionEffect, OrderLog};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
+use super::propagator::paid;
 
 /// `price = reference + side * mean displacement * mid / 1e4`: what was bought less what was sold moves the price for good, and
 /// an order pays the mean of the displacement it finds and the one it leaves.
@@ -15,11 +16,15 @@ use super::need::{Demanding, Need, known};
 /// depends on the sum of what was traded alone. Of laws by which each order moves the price for good by a function of its own
 /// size, only the linear one is free of round trips that gain (Huberman & Stanzl).
 ///
+/// With `paid` an order pays that part of what it moves itself, instead of the mean: 0 where it fills before the price moves, as
+/// orders of markets do whose fills are told by the spread, the walk and an impact of their own. With less than a half of it a
+/// round trip gains, unless these cost more.
+///
 /// Own orders that wait do so in the market as it was moved: after purchases those to buy are further from being filled, and those to
 /// sell nearer, where they take.
 ///
-/// The tape does not react: where it was recorded while the orders were sent, it shows what they left, and the law finds
-/// nothing besides.
+/// The tape of a backtest does not react. Where a log's tape was recorded while its orders were in the market
+/// ([`OrderLog::shows_own_orders`]), it shows what they left: the law then says how the mid moves, and not what later orders pay.
 ///
 /// Source: Almgren & Chriss, "Optimal execution of portfolio transactions", Journal of Risk 3 (2001); Huberman & Stanzl,
 /// "Price manipulation and quasi-arbitrage", Econometrica 72 (2004); the square root of what a parent order has traded so far,
@@ -27,7 +32,8 @@ use super::need::{Demanding, Need, known};
 #[derive(Debug, Clone, Copy)]
 pub struct PermanentImpact;
 
-const LINEAR: usize = 0;
+/// The forms, in this order: first those in which an order pays the mean of what it finds and leaves.
+const SHOWN: usize = 2;
 
 impl Mechanism<Execution> for PermanentImpact {
     fn about(&self) -> About {
@@ -43,15 +49,22 @@ impl Mechanism<Execution> for PermanentImpact {
     }
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
-        let one = |name, parameter| Form {
-            name,
-            parameters: vec![Parameter::new(parameter, "bps", 0.0).within(0.0, 100_000.0).starting_at(&[100.0, 1_000.0])],
-        };
-        vec![one("linear", "bps_at_full_participation"), one("square_root", "sqrt_bps_at_full_participation")]
+        let bps =
+            |name, starts: &[f64]| Parameter::new(name, "bps", 0.0).within(0.0, 1e6).starting_at(starts).proportional();
+        let line = || bps("bps_at_full_participation", &[10_000.0, 1_000.0, 100.0]);
+        let root = || bps("sqrt_bps_at_full_participation", &[1_000.0, 100.0, 10.0]);
+        vec![
+            Form { name: "linear", parameters: vec![line()] },
+            Form { name: "square_root", parameters: vec![root()] },
+            Form { name: "linear, shown", parameters: vec![line(), paid()] },
+            Form { name: "square_root, shown", parameters: vec![root(), paid()] },
+        ]
     }
 
+    /// Where the tape shows own orders, looks at the mid tell of it; where it does not, what later orders pay.
     fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
-        known(self.needs(form), log)
+        let told = if form >= SHOWN { log.looks() > 0 } else { true };
+        known(self.needs(form), log) && log.shows_own_orders() == (form >= SHOWN) && told
     }
 
     fn memory(&self) -> f64 {
@@ -59,8 +72,9 @@ impl Mechanism<Execution> for PermanentImpact {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
-        let mean = if form == LINEAR { mean_of_lines } else { mean_of_roots };
-        Box::new(Displaced { mean, bps: thetas.row(0).to_vec(), traded: vec![0.0; thetas.lanes()] })
+        let mean = if form.is_multiple_of(SHOWN) { mean_of_lines } else { mean_of_roots };
+        let paid = (form >= SHOWN).then(|| thetas.row(1).to_vec());
+        Box::new(Displaced { mean, bps: thetas.row(0).to_vec(), paid, traded: vec![0.0; thetas.lanes()] })
     }
 }
 
@@ -75,20 +89,29 @@ struct Displaced {
     /// Mean displacement between two sums of what was traded, over that of a day's volume.
     mean: fn(f64, f64) -> f64,
     bps: Vec<f64>,
+    /// The part of what an order moves that it pays itself, where it is not the mean.
+    paid: Option<Vec<f64>>,
     /// Bought less sold, in days' volumes.
     traded: Vec<f64>,
 }
 
 impl Law<Execution> for Displaced {
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
-        let lanes = self.bps.iter().zip(&mut self.traded);
-        for (((effect, met), order), (bps, traded)) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(lanes) {
+        let lanes = self.bps.iter().zip(&mut self.traded).enumerate();
+        for (((effect, met), order), (lane, (bps, traded))) in
+            effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(lanes)
+        {
+            let found = (self.mean)(*traded, *traded);
+            effect.displaced += bps * found * order.mid * 1e-4;
             if !order.takes() {
-                effect.displaced += bps * (self.mean)(*traded, *traded) * order.mid * 1e-4;
                 continue;
             }
             let after = *traded + order.side.sign() * order.participation(met.volume);
-            effect.concession += order.side.sign() * bps * (self.mean)(*traded, after) * order.mid * 1e-4;
+            let own = match &self.paid {
+                Some(paid) => paid[lane] * ((self.mean)(after, after) - found),
+                None => (self.mean)(*traded, after) - found,
+            };
+            effect.concession += order.side.sign() * bps * own * order.mid * 1e-4;
             *traded = after;
         }
     }

@@ -4,6 +4,14 @@ use std::f64::consts::LN_2;
 
 use statrs::function::gamma::ln_gamma;
 
+use crate::sim2real::Parameter;
+
+/// The part of what an order moves that it pays itself, in forms that state it. No fit moves it: fills and mids that follow them
+/// say nothing of it that a spread and an impact of the order's own do not say.
+pub(super) fn paid() -> Parameter {
+    Parameter::new("paid", "", 0.0).within(0.0, 1.0).known_to(0.0)
+}
+
 /// A kernel `G(t) = sum of weight * exp(-rate * t)`, with G(0) = 1, and what is left of all that it was kicked by.
 ///
 /// Weights are not negative, so the kernel is completely monotone: with it linear impact knows no round trip that gains

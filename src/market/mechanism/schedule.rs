@@ -40,7 +40,7 @@ impl Child {
 
 /// What `law` adds to the price of `order` at `time` [s], one lane.
 pub(super) fn concession(law: &mut dyn Law<Execution>, time: f64, order: InFlight) -> f64 {
-    acted(law, time, order, 0.0).concession
+    acted(law, time, order, 0.0).paid(&order, &Met::at(Book::at_price(order.decided_at, MID), MID, f64::INFINITY))
 }
 
 /// What `law` does to `child` where so much is `displayed` at its price [units].

@@ -31,7 +31,10 @@ impl Mechanism<Execution> for SqrtImpact {
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
         Form::only(vec![
-            Parameter::new("bps_at_full_participation", "bps", 0.0).within(0.0, 100_000.0).starting_at(&[10.0, 100.0]),
+            Parameter::new("bps_at_full_participation", "bps", 0.0)
+                .within(0.0, 100_000.0)
+                .starting_at(&[1_000.0, 100.0, 10.0])
+                .proportional(),
         ])
     }
 

@@ -4,7 +4,7 @@ use crate::market::{Execution, ExecutionEffect, OrderLog};
 use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
-use super::propagator::Propagator;
+use super::propagator::{Propagator, paid};
 
 /// `price = reference + side * (D + own / 2) * mid / 1e4`: an order pays what earlier orders of one's own have left of the
 /// displacement `D`, and half of what it adds itself.
@@ -19,10 +19,15 @@ use super::propagator::Propagator;
 /// as both forms are, and impact linear in the quantity, no round trip gains (Gatheral; Alfonsi, Schied & Slynko); a
 /// square-root law with exponential decay would let one gain, which is why there is none here.
 ///
+/// With `paid` an order pays that part of what it moves itself, instead of half of it: 0 where it fills before the price moves, as
+/// orders of markets do whose fills are told by the spread, the walk and an impact of their own. With less than a half of it a
+/// round trip gains, unless these cost more.
+///
 /// Own orders that wait do so in the market as far as it is still moved.
 ///
-/// The tape does not react: where it was recorded while the orders were sent, it shows what they left, and the law finds
-/// nothing besides. Orders follow each other by when they meet the market.
+/// The tape of a backtest does not react. Where a log's tape was recorded while its orders were in the market
+/// ([`OrderLog::shows_own_orders`]), it shows what they left: the law then says how the mid moves, and not what later orders pay.
+/// Orders follow each other by when they meet the market.
 ///
 /// Source: Obizhaeva & Wang, "Optimal trading strategy and supply/demand dynamics", Journal of Financial Markets 16 (2013);
 /// Bouchaud, Gefen, Potters & Wyart, "Fluctuations and response in financial markets", Quantitative Finance 4 (2004), who
@@ -31,7 +36,8 @@ use super::propagator::Propagator;
 #[derive(Debug, Clone, Copy)]
 pub struct TransientImpact;
 
-const EXPONENTIAL: usize = 0;
+/// The forms, in this order: first those in which an order pays half of what it moves.
+const SHOWN: usize = 2;
 
 impl Mechanism<Execution> for TransientImpact {
     fn about(&self) -> About {
@@ -48,21 +54,29 @@ impl Mechanism<Execution> for TransientImpact {
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
         let bps = || {
-            let bps = Parameter::new("bps_at_full_participation", "bps", 0.0).within(0.0, 100_000.0);
-            bps.starting_at(&[100.0, 1_000.0]).proportional()
+            let bps = Parameter::new("bps_at_full_participation", "bps", 0.0).within(0.0, 1e6);
+            bps.starting_at(&[10_000.0, 1_000.0, 100.0]).proportional()
         };
         let recovery = Parameter::new("recovery", "s", 0.0).within(0.0, 1e7);
         let lag = Parameter::new("lag", "s", 0.0).within(0.0, 1e5).starting_at(&[0.1, 1.0, 10.0, 100.0]);
         let exponent = Parameter::new("exponent", "", 0.0).within(0.0, 3.0).starting_at(&[0.3, 1.0]);
         let starts = [0.1, 1.0, 10.0, 60.0, 600.0, 3600.0];
+        let exponential = vec![bps(), recovery.starting_at(&starts)];
+        let power = vec![bps(), lag, exponent];
+        let shown = |parameters: &[Parameter]| parameters.iter().cloned().chain([paid()]).collect();
+        let (shown_exponential, shown_power) = (shown(&exponential), shown(&power));
         vec![
-            Form { name: "exponential", parameters: vec![bps(), recovery.starting_at(&starts)] },
-            Form { name: "power", parameters: vec![bps(), lag, exponent] },
+            Form { name: "exponential", parameters: exponential },
+            Form { name: "power", parameters: power },
+            Form { name: "exponential, shown", parameters: shown_exponential },
+            Form { name: "power, shown", parameters: shown_power },
         ]
     }
 
+    /// Where the tape shows own orders, looks at the mid tell of it; where it does not, what later orders pay.
     fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
-        known(self.needs(form), log)
+        let told = if form >= SHOWN { log.looks() > 0 } else { true };
+        known(self.needs(form), log) && log.shows_own_orders() == (form >= SHOWN) && told
     }
 
     fn memory(&self) -> f64 {
@@ -70,12 +84,18 @@ impl Mechanism<Execution> for TransientImpact {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
-        let kernel = |lane: usize| match form {
-            EXPONENTIAL => Propagator::exponential(thetas.row(1)[lane]),
-            _ => Propagator::power(thetas.row(1)[lane], thetas.row(2)[lane]),
+        let exponential = form.is_multiple_of(SHOWN);
+        let kernel = |lane: usize| match exponential {
+            true => Propagator::exponential(thetas.row(1)[lane]),
+            false => Propagator::power(thetas.row(1)[lane], thetas.row(2)[lane]),
+        };
+        let paid = match form < SHOWN {
+            true => vec![HALF; thetas.lanes()],
+            false => thetas.row(if exponential { 2 } else { 3 }).to_vec(),
         };
         Box::new(Decaying {
             bps: thetas.row(0).to_vec(),
+            paid,
             displaced: (0..thetas.lanes()).map(kernel).collect(),
             last: f64::NEG_INFINITY,
         })
@@ -88,9 +108,14 @@ impl Demanding for TransientImpact {
     }
 }
 
+/// What an order pays of what it moves where that is spread evenly over the prices it takes.
+const HALF: f64 = 0.5;
+
 #[derive(Clone)]
 struct Decaying {
     bps: Vec<f64>,
+    /// The part of what an order moves that it pays itself.
+    paid: Vec<f64>,
     /// What is left of own impact [bps].
     displaced: Vec<Propagator>,
     /// When the last order met the market [s].
@@ -109,13 +134,15 @@ impl Law<Execution> for Decaying {
             return;
         }
         self.last = self.last.max(tick.time);
-        let lanes = self.bps.iter().zip(&mut self.displaced);
-        for (((effect, met), order), (bps, displaced)) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(lanes)
+        let lanes = self.bps.iter().zip(&self.paid).zip(&mut self.displaced);
+        for (((effect, met), order), ((bps, paid), displaced)) in
+            effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(lanes)
         {
-            let own = order.side.sign() * bps * order.participation(met.volume);
+            let own = bps * order.participation(met.volume);
             displaced.pass(seconds);
-            effect.concession += order.side.sign() * (displaced.left() + 0.5 * own) * order.mid * 1e-4;
-            displaced.kick(own);
+            effect.displaced += displaced.left() * order.mid * 1e-4;
+            effect.concession += paid * own * order.mid * 1e-4;
+            displaced.kick(order.side.sign() * own);
         }
     }
 }

@@ -11,6 +11,7 @@ use super::clocks::Clocks;
 use super::decode::{Decode, Emit, Fault, price};
 use super::depth_rows::book_side;
 use super::order_rows::{Resting, id, rest_size};
+use super::{Dated, Departure, OrderStep};
 
 /// What a unit of volume is worth [units].
 const VOLUME: f64 = 1e-8;
@@ -40,7 +41,13 @@ fn action(words: &[Option<String>], row: usize) -> Result<OrderAction, Fault> {
     }
 }
 
-impl Decode<OrderEvent> for BitstampOrders {
+/// How an order left, by the volume of the row that deletes it: of a filled one nothing is left, a withdrawn one keeps what it had.
+fn departure(action: OrderAction, volumes: &[Option<f64>], row: usize) -> Option<Departure> {
+    let left = volumes.get(row).copied().flatten().filter(|_| action == OrderAction::Delete)?;
+    Some(if left > 0.0 { Departure::Withdrawn } else { Departure::Filled })
+}
+
+impl<T: From<OrderStep> + Dated + Clone + PartialEq> Decode<T> for BitstampOrders {
     fn columns(&self) -> Vec<&str> {
         self.clocks.columns().chain(["id", "price", "volume", "action", "direction"]).collect()
     }
@@ -53,7 +60,7 @@ impl Decode<OrderEvent> for BitstampOrders {
         LOCAL
     }
 
-    fn decode(&mut self, table: &Table, emit: &mut Emit<'_, OrderEvent>) -> Result<(), InputError> {
+    fn decode(&mut self, table: &Table, emit: &mut Emit<'_, T>) -> Result<(), InputError> {
         let times = self.clocks.times(table)?;
         let (ids, actions, sides) = (table.integers("id")?, table.texts("action")?, table.texts("direction")?);
         let (prices, volumes) = (table.floats("price")?, table.floats("volume")?);
@@ -73,7 +80,8 @@ impl Decode<OrderEvent> for BitstampOrders {
                 Ok(OrderEvent { time, known_at, id, action, side, price, size })
             });
             if let Some(event) = emit.sound(row, event)? {
-                self.resting.take(row, "id", event, emit)?;
+                let step = OrderStep { event, departure: departure(action, &volumes, row) };
+                self.resting.take(row, "id", step, emit)?;
             }
         }
         Ok(())

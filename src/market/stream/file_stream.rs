@@ -17,7 +17,7 @@ use super::lean::{LeanPrints, LeanQuotes};
 use super::order_rows::OrderRows;
 use super::print_rows::PrintRows;
 use super::quote_rows::QuoteRows;
-use super::{Dated, Known, Stream, StreamError};
+use super::{Dated, Known, NumberedPrint, OrderStep, Stream, StreamError};
 
 /// A file of market data, read some rows at a time: what is in memory does not grow with its length (see [`TableChunks`]).
 ///
@@ -154,7 +154,7 @@ impl FileStream<Known<Book>> {
         let has = |k: &usize| {
             self.chunks.first().is_some_and(|table| ["bid", "ask"].iter().any(|side| table.has(&format!("{side}{k}"))))
         };
-        (2..=Book::DEPTH).filter(has).last().unwrap_or(1)
+        (2..=Book::DEPTH).rfind(has).unwrap_or(1)
     }
 }
 
@@ -231,6 +231,35 @@ impl FileStream<Known<Print>> {
             Layout::Lean => Ok(Box::new(LeanPrints::new(format))),
             Layout::DatabentoMbo => Ok(Box::new(DatabentoPrints::new(format))),
             layout => Err(no_such(path, layout, "trades")),
+        })
+    }
+}
+
+impl FileStream<NumberedPrint> {
+    /// The same trades with their numbers, where the layout has such.
+    ///
+    /// # Errors
+    /// As [`FileStream::trades`].
+    pub fn numbered_trades(path: impl AsRef<Path>, format: &FeedFormat, rows: usize) -> Result<Self, InputError> {
+        let path = path.as_ref();
+        Self::open(path, format, "trades", rows, |format| match format.layout {
+            Layout::Trueup | Layout::BinanceTrades => Ok(Box::new(PrintRows::new(format))),
+            layout => Err(no_such(path, layout, "trades")),
+        })
+    }
+}
+
+impl FileStream<OrderStep> {
+    /// Events of orders with what the file says of those that leave: `ts, order_id, action, side, price, size`, and Bitstamp's.
+    ///
+    /// # Errors
+    /// As [`FileStream::order_events`].
+    pub fn order_steps(path: impl AsRef<Path>, format: &FeedFormat, rows: usize) -> Result<Self, InputError> {
+        let path = path.as_ref();
+        Self::open(path, format, "book", rows, |format| match format.layout {
+            Layout::TrueupOrders => Ok(Box::new(OrderRows::new(format))),
+            Layout::BitstampL3 => Ok(Box::new(BitstampOrders::new(format))),
+            layout => Err(no_such(path, layout, "book")),
         })
     }
 }

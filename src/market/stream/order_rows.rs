@@ -9,6 +9,7 @@ use crate::sim2real::Timestamp;
 use super::clocks::Clocks;
 use super::decode::{Decode, Emit, Fault, price, size};
 use super::depth_rows::book_side;
+use super::{Dated, OrderStep};
 
 /// What rests in the book, by order: so much as is needed to tell a change of what is there from one of what is not.
 #[derive(Debug, Default)]
@@ -35,13 +36,15 @@ impl Resting {
 
     /// Holds an event to what rests. One of an order that does not is left out and counted: it was placed before the file
     /// begins, or is gone. An order that rests already cannot be added.
-    pub(super) fn take(
+    pub(super) fn take<T: From<OrderStep> + Dated + Clone + PartialEq>(
         &mut self,
         row: usize,
         id_column: &'static str,
-        event: OrderEvent,
-        emit: &mut Emit<'_, OrderEvent>,
+        step: impl Into<OrderStep>,
+        emit: &mut Emit<'_, T>,
     ) -> Result<(), InputError> {
+        let step = step.into();
+        let event = step.event;
         let known = self.0.contains_key(&event.id);
         match event.action {
             OrderAction::Add if known => {
@@ -57,7 +60,7 @@ impl Resting {
             OrderAction::Delete => drop(self.0.remove(&event.id)),
             _ => drop(self.0.insert(event.id, Rest { side: event.side, price: event.price, size: event.size })),
         }
-        emit.push(row, event)
+        emit.push(row, step.into())
     }
 }
 
@@ -124,7 +127,7 @@ impl OrderRows {
     }
 }
 
-impl Decode<OrderEvent> for OrderRows {
+impl<T: From<OrderStep> + Dated + Clone + PartialEq> Decode<T> for OrderRows {
     fn columns(&self) -> Vec<&str> {
         self.clocks.columns().chain(["order_id", "action", "side", "price", "size"]).collect()
     }
@@ -137,7 +140,7 @@ impl Decode<OrderEvent> for OrderRows {
         self.clocks.order_column()
     }
 
-    fn decode(&mut self, table: &Table, emit: &mut Emit<'_, OrderEvent>) -> Result<(), InputError> {
+    fn decode(&mut self, table: &Table, emit: &mut Emit<'_, T>) -> Result<(), InputError> {
         let times = self.clocks.times(table)?;
         let columns = Columns {
             ids: table.integers("order_id")?,

@@ -4,9 +4,9 @@ use crate::io::{FeedFormat, InputError, Layout, Table, TimeFormat, TimeUnit};
 use crate::market::row_check::can_be_price;
 use crate::market::{Finding, Print, Side};
 
-use super::Known;
 use super::clocks::Clocks;
 use super::decode::{Decode, Emit, Fault, number, scaled};
+use super::{Dated, Known, NumberedPrint};
 
 /// Reads trades.
 pub(in crate::market) struct PrintRows {
@@ -65,7 +65,7 @@ pub(super) fn trade_price(column: &str, values: &[Option<f64>], row: usize, scal
     Err(Fault::cell(Finding::Price, column, message, price, "is `price_scale` right?"))
 }
 
-impl Decode<Known<Print>> for PrintRows {
+impl<T: From<NumberedPrint> + Dated + Clone + PartialEq> Decode<T> for PrintRows {
     fn columns(&self) -> Vec<&str> {
         let own = self.binance.then_some("trade_id").into_iter().chain(["price"]).chain(self.names());
         self.clocks.columns().chain(own).collect()
@@ -79,7 +79,7 @@ impl Decode<Known<Print>> for PrintRows {
         self.clocks.order_column()
     }
 
-    fn decode(&mut self, table: &Table, emit: &mut Emit<'_, Known<Print>>) -> Result<(), InputError> {
+    fn decode(&mut self, table: &Table, emit: &mut Emit<'_, T>) -> Result<(), InputError> {
         let times = self.clocks.times(table)?;
         let [size, aggressor] = self.names();
         let (prices, sizes) = (table.floats("price")?, table.floats(size)?);
@@ -104,7 +104,7 @@ impl Decode<Known<Print>> for PrintRows {
                 Ok(Print { time, price, size, aggressor: self.aggressor(word) })
             });
             if let Some(what) = emit.sound(row, print)? {
-                emit.push(row, Known { known_at, what })?;
+                emit.push(row, NumberedPrint { print: Known { known_at, what }, number: id }.into())?;
             }
         }
         Ok(())

@@ -24,6 +24,8 @@ pub(in crate::market) struct Rules {
     pub limit_fill: LimitFill,
     pub queue: QueueModel,
     pub halted: WhileHalted,
+    /// Whether the data show what own orders did to the market.
+    pub shows_own: bool,
     /// The first message's time is this of the run [ns]: laws count from it.
     pub origin: Timestamp,
 }
@@ -206,14 +208,15 @@ impl Floor {
     /// Lets an order meet an offer: price, part filled, quantity and fee.
     pub(super) fn meet(&mut self, arriving: &InFlight, offer: &Offer) -> (f64, f64, f64, f64) {
         let tick = self.tick(offer.at);
-        let met = Met::at(offer.book, offer.reference, offer.volume);
+        let shows_own = self.rules.shows_own;
+        let met = Met { shows_own, ..Met::at(offer.book, offer.reference, offer.volume) };
         self.run.deliver(&[*arriving]);
         let (concessions, mut before) = (&mut self.concessions, 0.0);
         self.run.advance_seen(
             tick,
             |_| met,
             |law, effects| {
-                let after = effects.first().map_or(0.0, |effect| effect.concession);
+                let after = effects.first().map_or(0.0, |effect| effect.paid(arriving, &met));
                 if let Some(own) = concessions.get_mut(law) {
                     *own = after - before;
                 }

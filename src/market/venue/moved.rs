@@ -77,7 +77,7 @@ impl Floor {
 
     /// The same where the recorded price is `mid` [currency].
     pub(super) fn displace_by(&mut self, at: Timestamp, mid: f64) {
-        if self.moved.laws.is_empty() || self.resting.is_empty() {
+        if self.moved.laws.is_empty() || self.resting.is_empty() || self.rules.shows_own {
             return;
         }
         // Laws say it in bps of the mid: any order would be told the same.

@@ -39,12 +39,27 @@ impl Section for Errors<'_> {
                 }
             })
             .collect();
+        let by_recording: Vec<Value> = self
+            .diagnosis
+            .location
+            .recordings
+            .iter()
+            .map(|e| {
+                context! {
+                    recording => &e.recording,
+                    channel => axis(&e.channel, &e.unit),
+                    share => percent(e.share_of_error),
+                    rmse => [e.nominal_rmse, e.recalibrated_rmse, e.trued_rmse].map(number).to_vec(),
+                    rows => e.rows,
+                }
+            })
+            .collect();
         let placebo = self.diagnosis.checks.placebo_p.map(percent);
         let held_out = &self.diagnosis.held_out;
         fill(
             "errors.html",
             include_str!("../templates/errors.html"),
-            context! { rows => rows, placebo => placebo, held_out => held_out },
+            context! { rows => rows, by_recording => by_recording, placebo => placebo, held_out => held_out },
         )
     }
 }

@@ -193,8 +193,11 @@ impl Model {
             .and_then(|used| compile("outputs", &parameters, &state_names, &used, &outputs))?;
         let moving = system.attach.as_ref().map(|a| moving(a, &system, &rates, &parameters, &definitions)).transpose()?;
         let shown = state_names.iter().map(|name| shown(name, &rates, &outputs)).collect();
-        let channel =
-            |output: &OutputVariable| Channel { name: output.name.clone().into(), unit: output.unit.clone().into() };
+        let channel = |output: &OutputVariable| Channel {
+            name: output.name.clone().into(),
+            unit: output.unit.clone().into(),
+            exact: false,
+        };
         let channels = system.outputs.iter().map(channel).collect();
         Ok(Self { channels, rates: rate_program, seen, moving, shown, system })
     }

@@ -153,6 +153,33 @@ pub struct Where {
     /// The states that hold most of the error, the most telling first.
     #[serde(default)]
     pub against: Vec<Bin>,
+    /// Where there are several recordings, the errors of each on held-out data.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recordings: Vec<RecordingError>,
+}
+
+/// How far a channel of one recording is off on held-out data, before and after.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RecordingError {
+    /// The recording: of orders the log, and the symbol where a log is of several.
+    pub recording: String,
+    /// The channel.
+    pub channel: String,
+    /// Its unit, and that of all errors.
+    pub unit: String,
+    /// Rows with a sample.
+    pub rows: usize,
+    /// The part of the channel's squared error that lies within, from 0 to 1, of the recalibrated twin.
+    pub share_of_error: f64,
+    /// Root mean square error of the twin as given.
+    #[serde(deserialize_with = "without_bound")]
+    pub nominal_rmse: f64,
+    /// Of the twin with its own parameters refitted.
+    #[serde(deserialize_with = "without_bound")]
+    pub recalibrated_rmse: f64,
+    /// Of the twin with what was found added.
+    #[serde(deserialize_with = "without_bound")]
+    pub trued_rmse: f64,
 }
 
 /// A range of a state that holds more of a channel's error than of its rows.

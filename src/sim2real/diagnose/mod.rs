@@ -7,9 +7,12 @@
 //! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out; `verdict`
 //! weighs it all, and `words` tells it. `gates` says how long steps of integration may be, and `recognize` sees what needs no
 //! fit. `locate` and `onset` say where and since when the twin is off, `activity` when what was named acted, and `experiment`
-//! designs, from the commands of `excitation`, what to record where rivals are left.
+//! designs, from the commands of `excitation`, what to record where rivals are left. Where recordings show several things that no
+//! mechanism has in common, each of these `aspects` goes through all of it by itself.
 
 mod activity;
+mod aspects;
+mod by_recording;
 mod confidence;
 mod diagnosis;
 mod evidence;
@@ -35,8 +38,8 @@ mod whiteness;
 mod words;
 
 pub use diagnosis::{
-    Bin, ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment, ParameterChange, Rival, SCHEMA,
-    Score, Stretch, Verdict, Where,
+    Bin, ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment, ParameterChange, RecordingError,
+    Rival, SCHEMA, Score, Stretch, Verdict, Where,
 };
 pub use evidence::{Evidence, HELD_OUT};
 pub use excitation::Excitation;
@@ -127,6 +130,30 @@ pub fn diagnose<T: Twin>(
     seed: Seed,
     progress: Progress<'_>,
 ) -> Outcome<T> {
+    let aspects = aspects::split(twin, recordings, held_out);
+    let mut each = aspects.iter().map(|aspect| of_one(twin, &aspect.recordings, &aspect.held_out, seed, progress));
+    match each.next() {
+        Some(first) => aspects::joined(twin, first, each.collect()),
+        None => of_one(twin, recordings, held_out, seed, progress).outcome,
+    }
+}
+
+/// What was found of one aspect.
+pub(super) struct Answered<T> {
+    outcome: Outcome<T>,
+    /// What was added to the twin, in the order of its parameters.
+    added: Vec<Candidate>,
+    facts: words::Facts,
+}
+
+/// The same of recordings that show one thing.
+fn of_one<T: Twin>(
+    twin: &T,
+    recordings: &[Recording<T::Stimulus>],
+    held_out: &[Recording<T::Stimulus>],
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Answered<T> {
     let signs = recognize::signs(twin, recordings);
     let lost = recognize::lost(twin, recordings);
     let of_steps = twin.recognized(&Signs { repeated: 0.0, run: 0.0, ..signs });
@@ -158,7 +185,7 @@ fn followed<T: Twin>(
     found: &Found,
     seed: Seed,
     progress: Progress<'_>,
-) -> Outcome<T> {
+) -> Answered<T> {
     progress("dividing the recordings", 0, 1);
     let evidence = Evidence::divide(twin, recordings, held_out);
     let candidates = recognize::fixed(twin.candidates(recordings));
@@ -198,6 +225,7 @@ fn followed<T: Twin>(
         std: inflated(&inquiry, &selection.selected, &trued),
         trued: trued.clone(),
         sampled: twin.clock() != Clock::Event,
+        inexact: verdict::inexact(&inquiry, &selection.selected),
     };
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
     // What the fit has named already need not be recognized besides.
@@ -207,6 +235,7 @@ fn followed<T: Twin>(
     progress("saying where", 0, 1);
     let covariates = locate::covariates(&inquiry);
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
+    diagnosis.location.recordings = by_recording::by_recording(&comparisons);
     let activities = activity::activities(&inquiry, &selection.selected, &trued, &covariates);
     activity::tell(&mut diagnosis, &inquiry, &selection.selected, activities);
     let profiles = profile::profiles(&inquiry, &selection.recalibrated, &selection.selected, &covariates);
@@ -216,13 +245,17 @@ fn followed<T: Twin>(
         diagnosis.next_experiment = Some(next);
         excitation
     });
+    let facts = verdict::facts(&inquiry, &findings);
+    let mut added: Vec<Candidate> = selection.selected.added.iter().map(|number| candidates[*number].clone()).collect();
     let (mut trued_twin, mut values, mut std) = (selection.selected.twin, trued.values, findings.std);
     for candidate in seen {
         trued_twin = trued_twin.with(candidate);
         values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
         std.resize(values.len(), 0.0);
+        added.push(candidate.clone());
     }
-    Outcome { diagnosis, trued: trued_twin, values, std, comparisons, profiles, excitation }
+    let outcome = Outcome { diagnosis, trued: trued_twin, values, std, comparisons, profiles, excitation };
+    Answered { outcome, added, facts }
 }
 
 /// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.

@@ -7,7 +7,7 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::select::Selection;
 use super::weigh::{SHARE, completes, gain, lead, pursued, share};
-use crate::sim2real::{About, Candidate, Twin};
+use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
 const SLIGHT: f64 = 0.02;
@@ -174,7 +174,12 @@ fn loss<T: Twin>(
     }
     if other.contains.contains(&own.name) && rival.free() > selected.free() {
         let slight = share(first, selected, rival) < SLIGHT && !completes(selected, rival);
-        return if slight { loss.max(0.5 * WITHIN) } else { loss + WITHIN };
+        return match slight {
+            true => loss.max(0.5 * WITHIN),
+            // Of messages laws have the form they are written in: what comes near may well be the one.
+            false if inquiry.twin.clock() == Clock::Event => loss,
+            false => loss + WITHIN,
+        };
     }
     loss
 }

@@ -12,6 +12,8 @@ const GROUPS: usize = 8;
 
 /// A residual beyond this quantile of its size is drawn in to it: a few wild orders must not hide what the many say.
 const WINSOR: f64 = 0.95;
+/// A residual of this part of the largest is nothing.
+const NOTHING: f64 = 1e-3;
 
 /// A covariate that the mean residual depends on.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,7 +40,9 @@ pub(super) fn strongest_dependence(residual: &[f64], rows: &[usize], covariates:
 }
 
 fn winsorize(residual: &[f64]) -> Vec<f64> {
-    let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
+    let largest = residual.iter().fold(0.0_f64, |most, r| most.max(r.abs()));
+    // Where most are nothing at all, as of orders that are filled but for a few, these few are what there is to say.
+    let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).filter(|size| *size > NOTHING * largest).collect();
     sizes.sort_by(f64::total_cmp);
     let limit =
         sizes.get(((sizes.len() as f64 * WINSOR) as usize).min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0);

@@ -14,7 +14,7 @@ use super::select::Selection;
 use super::structure::Dependence;
 use super::{whiteness, words};
 use crate::sim2real::identify::Fit;
-use crate::sim2real::{Candidate, Clock, Twin};
+use crate::sim2real::{Candidate, Clock, Part, Twin};
 
 /// A remainder above this part of the first misfit is more than an error of form.
 const FORM_ERROR: f64 = 0.10;
@@ -23,7 +23,7 @@ const MOSTLY_LEFT: f64 = 0.35;
 /// The mean square of the noise is known to this factor.
 const NOISE_KNOWN: f64 = 1.05;
 /// A residual counts as structured where a covariate's F test is this strong (-log10 p): complete models reach 5.
-const DEPENDENT: f64 = 8.0;
+const DEPENDENT: f64 = 6.5;
 /// A residual counts as structured where a regression foretells this part of it on held-out data.
 const FORETOLD: f64 = 0.10;
 /// Where this part of it is foretold, what is left is physics, however small it is beside what was found.
@@ -35,11 +35,15 @@ const FAR_ABOVE_THE_NOISE: f64 = 9.0;
 const ABOVE_THE_NOISE: f64 = 2.0;
 /// What a regression foretells counts where the mean squared residual is more than this many times the noise.
 const HARDLY_ABOVE: f64 = 1.2;
+/// A row of a channel without noise is off by more than this, in roundings, and more rows than one are, where something is missing.
+const FAR_OFF: f64 = 5.0;
+const FEW: usize = 4;
 /// With fewer rows than this, what is not explained is not called explained either.
 const FEWEST_ROWS: usize = 50;
 /// Confidence in what needs no fit to be seen.
 const CERTAIN_BY_SIGHT: f64 = 0.99;
-/// A mechanism that changes the residuals by less than this, in noise and over all rows, does nothing.
+/// A mechanism that changes the residuals by less than this, in noise and over all rows, does nothing. Where they are smaller than the
+/// noise, as those of prices that are rounded to ticks may be, it is in their own size.
 const DISTINCT: f64 = 5.0;
 /// Larger by less than this, an error is as large.
 const WORSE: f64 = 1.02;
@@ -61,6 +65,8 @@ pub(super) struct Findings {
     pub trued: Fit,
     /// Whether rows are samples of signals, rather than messages.
     pub sampled: bool,
+    /// Whether what knows no noise is off.
+    pub inexact: bool,
 }
 
 /// The whole result.
@@ -85,7 +91,7 @@ pub(super) fn diagnosis<T: Twin>(
     Diagnosis {
         schema: SCHEMA.to_owned(),
         verdict,
-        summary: words::summary(inquiry, verdict, &effects, findings),
+        summary: words::summary(&facts(inquiry, findings), verdict, &effects),
         location: Where::default(),
         parameters: parameters(inquiry, selected, findings),
         fit: findings.fits.clone(),
@@ -103,6 +109,17 @@ pub(super) fn diagnosis<T: Twin>(
         modelled: inquiry.twin.modelled().into_iter().map(str::to_owned).collect(),
         held_out: inquiry.evidence.how.clone(),
         effects,
+    }
+}
+
+/// What the words for the verdict are made of.
+pub(super) fn facts<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> words::Facts {
+    words::Facts {
+        name: inquiry.twin.name(),
+        tried: inquiry.candidates.iter().map(|candidate| (candidate.about.name, candidate.about.title)).collect(),
+        fits: findings.fits.clone(),
+        remainder: findings.remainder,
+        dependence: findings.dependence.clone(),
     }
 }
 
@@ -163,6 +180,7 @@ fn distinct<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> bool
     let fit = &selected.fit;
     let residual = |values: &[f64]| problem.evaluate(values, &fit.state, &[]).residual;
     let with = residual(&fit.values);
+    let size = (with.norm_squared() / with.len().max(1) as f64).sqrt().min(1.0);
     let mut at = inquiry.twin.parameters().len();
     selected.added.iter().all(|number| {
         let candidate = &inquiry.candidates[*number];
@@ -172,7 +190,7 @@ fn distinct<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> bool
         for (value, p) in values[from..from + count].iter_mut().zip(&candidate.form.parameters) {
             *value = p.nominal;
         }
-        candidate.finishing || (&with - residual(&values)).norm() >= DISTINCT
+        candidate.finishing || (&with - residual(&values)).norm() >= DISTINCT * size
     })
 }
 
@@ -197,6 +215,15 @@ fn not_excited(scores: &[Score]) -> Vec<String> {
     ids
 }
 
+/// Whether channels without noise are further off than their rounding, and not in a row or two alone.
+pub(super) fn inexact<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> bool {
+    let exact = |name: &str| inquiry.twin.channels().iter().any(|channel| channel.exact && channel.name == name);
+    let off = selected.misfits.iter().any(|m| exact(&m.channel) && !m.within(ABOVE_THE_NOISE, 1.0));
+    let blocks = inquiry.problem(&selected.twin, &inquiry.evidence.compared).blocks();
+    let rows = blocks.into_iter().filter(|block| exact(&block.channel)).flat_map(|block| block.range);
+    off && rows.filter(|row| selected.fit.residual[*row].abs() > FAR_OFF).count() >= FEW
+}
+
 fn structured(findings: &Findings) -> bool {
     findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
 }
@@ -209,10 +236,10 @@ fn held_out_remainder(fit: &ChannelFit) -> f64 {
     if misfit > 0.0 { above(fit.trued_rmse, NOISE_KNOWN) / misfit } else { 0.0 }
 }
 
-/// Whether so much is left on held-out data that what was named does not explain them.
-fn fails_unseen(fit: &ChannelFit, sampled: bool) -> bool {
+/// Whether so much is left on held-out signals that what was named does not explain them.
+fn fails_unseen(fit: &ChannelFit) -> bool {
     let remainder = held_out_remainder(fit);
-    far_off(fit) && remainder > FORM_ERROR || sampled && remainder > MOSTLY_LEFT
+    far_off(fit) && remainder > FORM_ERROR || remainder > MOSTLY_LEFT
 }
 
 /// Whether the recalibrated twin leaves more than the noise on held-out data.
@@ -243,12 +270,13 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
         || findings.foretold > FORETOLD_WELL && !floor(HARDLY_ABOVE);
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
-        return match left_over || !selection.selected.within(ABOVE_THE_NOISE) {
+        // Messages have noise of their own beside the rounding of what they tell: it alone is nothing that is missing.
+        return match left_over || findings.inexact || findings.sampled && !selection.selected.within(ABOVE_THE_NOISE) {
             _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(NEAR_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
             // What is clean where it was fitted and far off elsewhere was not moved enough to be told.
             false if findings.fits.iter().any(far_off) && selection.selected.within(NEAR_THE_NOISE) => Verdict::NotExcited,
-            false if findings.fits.iter().any(far_off) => Verdict::Unexplained,
+            false if findings.sampled && findings.fits.iter().any(far_off) => Verdict::Unexplained,
             false => Verdict::NoMismatch,
         };
     }
@@ -257,20 +285,18 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
         let visible = findings.fits.iter().any(above_the_noise);
         return match findings.sampled {
-            _ if !clean => Verdict::Unexplained,
+            true if !clean => Verdict::Unexplained,
             // What held-out data hardly reach, they do not speak against.
             true if library(effects) >= CERTAIN && !findings.fits.iter().any(worse) => Verdict::Ambiguous,
             true if library(effects) < LIKELIER_THAN_NOT && visible => Verdict::Unexplained,
             _ => Verdict::NotExcited,
         };
     }
-    let unseen = findings.fits.iter().any(|fit| fails_unseen(fit, findings.sampled));
+    let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
     // What the fitted data leave no doubt of is right although its form does not carry over to others.
     let doubtful = findings.sampled && library(effects) < if unseen { CERTAIN } else { HARDLY_THE_LIBRARY };
-    if doubtful
-        || unseen && !findings.sampled
-        || left_over && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL)
-    {
+    let unexplained = left_over || findings.inexact;
+    if doubtful || unexplained && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
         return Verdict::Unexplained;
     }
     if unseen || effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
@@ -354,7 +380,13 @@ fn parameters<T: Twin>(
 
 fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> Vec<String> {
     let parts = inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out);
-    let mut notes: Vec<String> = parts.flat_map(|p| inquiry.twin.notes(p.recording)).collect();
+    // Of several recordings a note says which it is of.
+    let several = inquiry.evidence.free_run.len() > 1;
+    let told = |name: &str, note: String| if several { format!("{name}: {note}") } else { note };
+    let of = |part: &Part<'_, T::Stimulus>| {
+        inquiry.twin.notes(part.recording).into_iter().map(|n| told(&part.recording.name, n)).collect::<Vec<_>>()
+    };
+    let mut notes: Vec<String> = parts.flat_map(of).collect();
     let mut told = BTreeSet::new();
     notes.retain(|note| told.insert(note.clone()));
     let smooth = selected.fit.jacobian.ncols();
@@ -432,8 +464,8 @@ mod tests {
         assert!(worse(&fit(2.0, 2.1)) && !worse(&fit(2.0, 2.0)));
         assert!(above_the_noise(&fit(1.2, 1.0)) && !above_the_noise(&fit(1.05, 1.0)));
         assert!(far_off(&fit(9.0, 3.1)) && !far_off(&fit(9.0, 2.9)));
-        assert!(fails_unseen(&fit(9.0, 3.1), true), "a tenth of the misfit is left, far above the noise");
-        assert!(!fails_unseen(&fit(9.0, 2.9), true), "and close to it that is an error of form");
-        assert!(fails_unseen(&fit(3.0, 2.0), true), "unless it is a third");
+        assert!(fails_unseen(&fit(9.0, 3.1)), "a tenth of the misfit is left, far above the noise");
+        assert!(!fails_unseen(&fit(9.0, 2.9)), "and close to it that is an error of form");
+        assert!(fails_unseen(&fit(3.0, 2.0)), "unless it is a third");
     }
 }

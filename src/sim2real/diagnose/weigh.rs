@@ -14,6 +14,10 @@ const SHARE_OF_MORE: f64 = 0.03;
 const COMPLETES: f64 = 0.8;
 /// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
 const INFORMATIVE_ROWS: usize = 25;
+/// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were.
+const FEW_ROWS: usize = 4;
+const MOST: f64 = 0.8;
+const RESTORED: f64 = 0.2;
 /// Residuals with an autocorrelation time below this [rows] are taken for white.
 const FAIRLY_WHITE: f64 = 2.0;
 /// What stands behind by more than this after a few steps is not followed further.
@@ -155,8 +159,15 @@ pub(super) fn needed<T: Twin>(
     let moved = change().filter(|d| d.abs() > 1.0).count();
     // Effects below the noise show in the sum of many rows only: over how many it is spread counts then.
     let (fourth, second) = change().fold((0.0, 0.0), |(f, s), d| (f + d.powi(4), s + d.powi(2)));
+    // Messages tell some things exactly: a few that nothing else accounts for are enough.
+    let restored = (0..rows).filter(|i| {
+        let (before, after) = (less.fit.residual[*i], whole.fit.residual[*i]);
+        (before - after).abs() > 1.0 && after.abs() < RESTORED * before.abs()
+    });
+    let restored = restored.count();
+    let seen = inquiry.twin.clock() == Clock::Event && restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64;
     let spread = rows > 40 * INFORMATIVE_ROWS && second * second >= INFORMATIVE_ROWS as f64 * fourth;
-    enough && (spread || moved >= INFORMATIVE_ROWS)
+    enough && (spread || seen || moved >= INFORMATIVE_ROWS)
 }
 
 /// `sum N_e ln(RSS0 / RSS1) - dk ln N_e`, with the effective number of residuals of the *alternative*: autocorrelated

@@ -1,24 +1,33 @@
 //! The words for a verdict.
 
 use super::diagnosis::{ChannelFit, Effect, Verdict};
-use super::hypothesis::Inquiry;
-use super::verdict::Findings;
-use crate::sim2real::Twin;
+use super::structure::Dependence;
+
+/// What the words for a verdict are made of, beside the effects.
+#[derive(Debug, Clone)]
+pub(super) struct Facts {
+    /// Name of the twin's simulator.
+    pub name: String,
+    /// Id and title of every mechanism that was tried, each form once.
+    pub tried: Vec<(&'static str, &'static str)>,
+    /// Errors per channel.
+    pub fits: Vec<ChannelFit>,
+    /// The part of the misfit that is left.
+    pub remainder: f64,
+    /// What that depends on.
+    pub dependence: Option<Dependence>,
+}
 
 /// The answer, in one sentence.
-pub(super) fn summary<T: Twin>(
-    inquiry: &Inquiry<'_, T>,
-    verdict: Verdict,
-    effects: &[Effect],
-    findings: &Findings,
-) -> String {
+pub(super) fn summary(facts: &Facts, verdict: Verdict, effects: &[Effect]) -> String {
     let title = |id: &str| {
-        inquiry.candidates.iter().find(|c| c.about.name == id).map_or_else(|| id.to_owned(), |c| c.about.title.to_owned())
+        let own = facts.tried.iter().find(|(name, _)| *name == id);
+        own.map_or_else(|| id.to_owned(), |(_, title)| (*title).to_owned())
     };
     let names = listed(&effects.iter().map(|e| title(&e.mechanism)).collect::<Vec<_>>());
-    let name = inquiry.twin.name();
+    let name = &facts.name;
     // The first channel is the one a twin is about; others speak where it gained nothing.
-    let best = findings.fits.iter().find(|f| f.improvement_ci95[0] > 0.0).or(findings.fits.first());
+    let best = facts.fits.iter().find(|f| f.improvement_ci95[0] > 0.0).or(facts.fits.first());
     let gained = best.map_or_else(String::new, gained);
     match verdict {
         Verdict::Named => {
@@ -54,13 +63,13 @@ pub(super) fn summary<T: Twin>(
         ),
         Verdict::Unexplained if effects.is_empty() => format!(
             "Something is missing from the {name} that none of the {} known mechanisms explains{}.",
-            inquiry.candidates.len(),
-            shape(findings)
+            facts.tried.len(),
+            shape(facts)
         ),
         Verdict::Unexplained => format!(
             "Something is missing from the {name} that no known mechanism explains: {names} takes part of it, {:.0} % of the misfit is left{}.",
-            100.0 * findings.remainder,
-            shape(findings)
+            100.0 * facts.remainder,
+            shape(facts)
         ),
     }
 }
@@ -108,8 +117,8 @@ pub(super) fn figure(value: f64, digits: usize) -> String {
     format!("{value:.*}", (digits as f64 - 1.0 - magnitude).max(0.0) as usize)
 }
 
-fn shape(findings: &Findings) -> String {
-    findings.dependence.as_ref().map_or_else(String::new, |d| format!("; what is left depends on the {}", d.on))
+fn shape(facts: &Facts) -> String {
+    facts.dependence.as_ref().map_or_else(String::new, |d| format!("; what is left depends on the {}", d.on))
 }
 
 fn listed(names: &[String]) -> String {

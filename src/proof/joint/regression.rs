@@ -6,69 +6,23 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::terms::{Row, Term, library};
+use super::terms::{Row, library};
 use crate::conceal::benchmark::Case;
+use crate::proof::selection::selected;
 
 /// Half the window of the smoother [s].
 const WINDOW: f64 = 0.05;
 /// Rows used at most.
 const ROWS: usize = 2_500;
-/// Terms named at most.
-const MOST: usize = 3;
-/// A term must lower the criterion by this ...
-const WORTH: f64 = 10.0;
-/// ... and the squared error by this part, for with errors in the terms themselves the criterion alone keeps everything.
-const SHARE: f64 = 0.05;
 
 /// The names it gives, strongest first.
-pub(super) fn regression(case: &Case) -> Vec<String> {
+pub(in crate::proof) fn regression(case: &Case) -> Vec<String> {
     let Some(rows) = rows(case) else { return Vec::new() };
-    let mut left = column(&rows, |row| row.acceleration);
-    let mut basis: Vec<DVector<f64>> = Vec::new();
     let mut known: Vec<DVector<f64>> = vec![column(&rows, |row| row.command), column(&rows, |row| row.velocity)];
     if case.nominal[2] != 0.0 {
         known.push(column(&rows, |row| row.position.sin()));
     }
-    known.into_iter().for_each(|direction| explain(&mut basis, &mut left, direction));
-    let library = library(&rows, case.linear);
-    let count = rows.len() as f64;
-    let mut names: Vec<String> = Vec::new();
-    for _ in 0..MOST {
-        let before = left.norm_squared();
-        let open = library.iter().filter(|term| !names.iter().any(|name| name == term.id));
-        let tried = open.map(|term| {
-            let after = remaining(&basis, &left, term);
-            (count * (before / after.max(1e-300)).ln() - (term.columns.len() as f64 + 1.0) * count.ln(), after, term)
-        });
-        let Some((gain, after, term)) = tried.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
-        if gain < WORTH || after > (1.0 - SHARE) * before {
-            break;
-        }
-        names.push(term.id.to_owned());
-        term.columns.iter().for_each(|column| explain(&mut basis, &mut left, column.clone()));
-    }
-    names
-}
-
-/// Takes what `direction` explains out of what is left, and `direction` into the orthonormal basis.
-fn explain(basis: &mut Vec<DVector<f64>>, left: &mut DVector<f64>, mut direction: DVector<f64>) {
-    let whole = direction.norm();
-    for _ in 0..2 {
-        basis.iter().for_each(|known| direction -= known * known.dot(&direction));
-    }
-    let size = direction.norm();
-    if size > 1e-8 * whole {
-        direction /= size;
-        *left -= &direction * direction.dot(left);
-        basis.push(direction);
-    }
-}
-
-/// Squared error that a term would leave.
-fn remaining(basis: &[DVector<f64>], left: &DVector<f64>, term: &Term) -> f64 {
-    let (mut basis, mut left) = (basis.to_vec(), left.clone());
-    term.columns.iter().for_each(|column| explain(&mut basis, &mut left, column.clone()));
-    left.norm_squared()
+    selected(column(&rows, |row| row.acceleration), known, &library(&rows, case.linear))
 }
 
 fn column(rows: &[Row], of: impl Fn(&Row) -> f64) -> DVector<f64> {

@@ -32,11 +32,15 @@ pub enum Null {
     MisSet,
     /// Motion as a coarse integrator computes it.
     Coarse,
+    /// Noise with heavy tails.
+    HeavyTailed,
+    /// Decisions that foretell where the market goes.
+    Alpha,
+    /// Stamps rounded to a second.
+    Rounded,
 }
 
 impl Null {
-    const ALL: [Self; 5] = [Self::White, Self::Coloured, Self::Quantized, Self::MisSet, Self::Coarse];
-
     /// Whether it is made to mislead.
     #[must_use]
     pub fn adversarial(self) -> bool {
@@ -48,7 +52,7 @@ impl Null {
 pub const MIX: [usize; 5] = [45, 20, 15, 12, 8];
 
 /// The kind of each place in a hundred, none of which gather, and how many of that kind stand before it.
-pub(super) fn planned(index: usize) -> (usize, usize) {
+pub(in crate::conceal) fn planned(index: usize) -> (usize, usize) {
     // Every stretch of cases holds about its share of each kind (largest remainder), so that a run cut short is fair too.
     let mut counts = [0_usize; MIX.len()];
     let mut kind = 0;
@@ -58,11 +62,6 @@ pub(super) fn planned(index: usize) -> (usize, usize) {
         counts[kind] += 1;
     }
     (kind, counts[kind] - 1 + (index / 100) * MIX[kind])
-}
-
-/// The null of the `ordinal`-th case without an effect.
-pub(super) fn null(ordinal: usize) -> Null {
-    Null::ALL[ordinal % Null::ALL.len()]
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 
+use crate::proof::selection::Term;
+
 /// Smoothed motion and command at one row.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
@@ -16,13 +18,6 @@ pub(super) struct Row {
     pub acceleration: f64,
     /// The command some time ago.
     pub delayed: [f64; 3],
-}
-
-/// What a mechanism would add, with its inner numbers fixed.
-#[derive(Debug, Clone)]
-pub(super) struct Term {
-    pub id: &'static str,
-    pub columns: Vec<DVector<f64>>,
 }
 
 /// Speeds below this part of the usual one are rest.
