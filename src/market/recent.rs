@@ -43,10 +43,9 @@ impl Recent {
     fn turn(&mut self, time: Timestamp) {
         const NANOS: i64 = STEP as i64 * Timestamp::NANOS;
         if self.begun_at > 0.0 {
-            let over = ((time.0 - self.end) / NANOS + 1).clamp(1, STEPS as i64) as usize;
             self.squares.push_back((self.price / self.begun_at - 1.0).powi(2));
-            // Steps in which nothing was seen.
-            self.squares.extend(std::iter::repeat_n(0.0, over - 1));
+            let silent = ((time.0 - self.end) / NANOS).clamp(0, STEPS as i64) as usize;
+            self.squares.extend(std::iter::repeat_n(0.0, silent));
             while self.squares.len() > STEPS {
                 self.squares.pop_front();
             }
