@@ -87,6 +87,8 @@ pub struct Report {
     pub seen: f64,
     /// What the mid has done between the last look at it and this one, in standard deviations of what it does of itself.
     pub mid: f64,
+    /// What stood ahead of it beside what was displayed where it joined a queue, as a part of that.
+    pub ahead: f64,
 }
 
 impl Default for Report {
@@ -105,6 +107,7 @@ impl Default for Report {
             filled: 0.0,
             seen: 0.0,
             mid: 0.0,
+            ahead: 0.0,
         }
     }
 }
@@ -126,6 +129,7 @@ impl Report {
             filled: quantity / order.quantity,
             seen: 0.0,
             mid: 0.0,
+            ahead: 0.0,
         }
     }
 
@@ -167,7 +171,8 @@ impl Observation for Report {
             1 => fee_bps(self.fee, self.notional()).unwrap_or(0.0),
             2 => self.filled,
             3 => self.seen,
-            _ => self.mid,
+            4 => self.mid,
+            _ => self.ahead,
         }
     }
 }
@@ -176,14 +181,15 @@ impl Observation for Report {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Execution;
 
-/// What is seen of an order: cost against the assumed price, fee, part filled, and the mid it was decided on; and what is seen of
-/// the market between orders: the mid.
+/// What is seen of an order: cost against the assumed price, fee, part filled, the mid it was decided on, and its place in a queue;
+/// and what is seen of the market between orders: the mid.
 static CHANNELS: &[Channel] = &[
     Channel::new("cost", "bps"),
     Channel::new("fee", "bps").exact(),
     Channel::new("filled", "").exact(),
     Channel::new("seen", "bps"),
     Channel::new("mid", "sd"),
+    Channel::new("ahead", ""),
 ];
 
 /// An execution under way: the last report, and what the mid is on its way to.
@@ -278,13 +284,16 @@ impl Execution {
     const FEE_ROUNDING: f64 = 0.005;
     /// What the rounding of mids is of what they do of themselves [sd]: as much as would cost a tenth of the evidence.
     const PART_OF_NOISE: f64 = 0.3;
+    /// What a place between bounds is off by, as a part of what was displayed.
+    const PLACE: f64 = 0.03;
 
     /// To what precision a log can tell a channel, in its unit: no fit of it can be better than that.
     ///
     /// - `cost` and `seen` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
     /// - `fee` [bps]: half a cent over the notional;
     /// - `filled` []: half a lot over the quantity;
-    /// - `mid`: a part of what the mid does of itself, in which it is told.
+    /// - `mid`: a part of what the mid does of itself, in which it is told;
+    /// - `ahead`: a part of what was displayed, to which a place can be told.
     ///
     /// Each is the median over the orders; 0 for a channel of another name, or without orders.
     #[must_use]
@@ -298,6 +307,9 @@ impl Execution {
             "mid" => Self::PART_OF_NOISE,
             _ => 0.0,
         };
+        if channel == "ahead" {
+            return Self::PLACE;
+        }
         median(recording.stimulus.orders().iter().map(of).collect()).unwrap_or(0.0)
     }
 }
@@ -335,7 +347,8 @@ impl Dynamics<Execution> for Execution {
                 Role::Taker | Role::Maker => whole_lots((order.fillable(met.volume) - effect.ahead).max(0.0), effect.lot),
             };
             let price = met.reference + order.side.sign() * effect.paid(order, met);
-            state.report = Report { seen: met.seen, ..Report::of(order, price, quantity) };
+            let ahead = if met.displayed > 0.0 { effect.ahead / met.displayed } else { 0.0 };
+            state.report = Report { seen: met.seen, ahead, ..Report::of(order, price, quantity) };
             // Whoever rests decided long ago.
             if order.takes() {
                 state.foresight.decided(tick.time, order.side.sign());

@@ -6,7 +6,8 @@
 
 use crate::sim2real::Timestamp;
 
-use super::{InFlight, Seen, Tape};
+use super::log_rows::Made;
+use super::{InFlight, Seen, Side, Tape};
 
 /// Times after a fill at which the mid is looked at [s]; where there are many orders, fewer of them.
 const AFTER: [f64; 12] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 1_280.0];
@@ -74,6 +75,23 @@ impl Traded {
             other => other,
         }
     }
+}
+
+/// From when on what the mid does may come from a fill that was reported at a time, of an order that rested: just after the market
+/// came to its price, if that is what filled it, since that move is why it was filled and nothing it did.
+pub(super) fn crossed(tape: &Tape, made: &Made, reported: Timestamp) -> Timestamp {
+    let times = tape.quotes().times();
+    let rounding = if reported.0 % Timestamp::NANOS == 0 { Timestamp::NANOS } else { 1 };
+    let end = times.partition_point(|at| at.0 < reported.0 + rounding);
+    let first = times[..end].partition_point(|at| *at < reported).saturating_sub(1);
+    let quotes = tape.quotes().between(first, end);
+    let comes = |k: &usize| {
+        let quote = quotes.get(*k);
+        let other = quote.and_then(|quote| if made.order.side == Side::Buy { quote.ask() } else { quote.bid() });
+        other.is_some_and(|other| made.order.side.sign() * (other - made.price) <= 0.0)
+    };
+    let came = (0..quotes.len()).find(comes).and_then(|k| quotes.times().get(k).copied());
+    came.map_or(reported, |at| Timestamp(at.0 + 2).max(reported))
 }
 
 /// The looks at the mid of `tape` that tell what it does after `orders`, each with when it was decided and when it traded, in order
@@ -145,9 +163,9 @@ fn answered(orders: &[(Timestamp, Traded)]) -> Vec<Option<Answered>> {
 /// The step to which reports are rounded [ns]: a second, a millisecond, or not at all.
 fn rounding(orders: &[(Timestamp, Traded)]) -> i64 {
     let stamps = || {
-        orders.iter().flat_map(|(decided, traded)| match traded {
-            Traded::Report(at) => [*decided, *at],
-            Traded::Print(_) | Traded::No => [*decided, *decided],
+        orders.iter().map(|(decided, traded)| match traded {
+            Traded::Report(at) => *at,
+            Traded::Print(_) | Traded::No => *decided,
         })
     };
     let whole = |step: i64| stamps().all(|at| at.0 % step == 0);

@@ -63,6 +63,7 @@ pub mod paper;
 pub mod paper_run;
 mod past;
 mod price_assumption;
+mod queue_place;
 mod quote;
 mod rates;
 mod reason;

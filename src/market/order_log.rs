@@ -2,20 +2,22 @@
 
 use std::sync::Arc;
 
-use crate::sim2real::{Measured, Recording, Stimulus, Timestamp};
+use crate::sim2real::{Measured, Recording, Timestamp};
 
 use aspects::Aspect;
 
 use super::log_entry::fills_of_orders;
 use super::log_rows::{Made, Outcome, Stamps, made, market_orders, on_tape};
-use super::look::{Look, Traded, looks, shows_own};
+use super::look::{Look, Traded, crossed, looks, shows_own};
+use super::queue_place::{Place, Places};
 use super::shown_age::{ShownAge, shown_age};
 use super::{
-    Book, Execution, InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, Met, PriceAssumption, Role, Seen,
-    Side, Tape, cost_bps, fee_bps, own_print, shown_delay,
+    InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, PriceAssumption, Role, Seen, Tape, cost_bps, fee_bps,
+    own_print, shown_delay,
 };
 
 mod aspects;
+mod met;
 
 /// Where the orders of a log went, and what a backtest assumes of them.
 #[derive(Debug, Clone)]
@@ -45,6 +47,8 @@ pub struct OrderLog {
     made: Vec<Made>,
     /// Looks at the market, where it shows the orders.
     looks: Vec<Look>,
+    /// Places of orders that rested in their queues, where they were further back than what was displayed.
+    places: Vec<Place>,
     /// What of the log is looked at.
     aspect: Aspect,
     shows_own_orders: bool,
@@ -61,12 +65,14 @@ enum Row {
     Order(usize),
     /// A fill of an order that rested, by its number.
     Made(usize),
+    /// The place of an order that rested, by its number.
+    Queued(usize),
     /// A look at the mid.
     Look(Look),
 }
 
 impl OrderLog {
-    /// The recording of a log: a row a market order, in order of decision, with the channels of [`Execution`]. Where the tape shows
+    /// The recording of a log: a row a market order, in order of decision, with the channels of [`Execution`](super::Execution). Where the tape shows
     /// what the orders did, one of its [`aspects`](Self::aspects) has rows between them for looks at the mid.
     ///
     /// `cost` is lost (`None`) where nothing was filled; it and `filled` are where the order was larger than all that was displayed:
@@ -96,6 +102,8 @@ impl OrderLog {
         let (orders, fills) = (orders.as_ref(), fills.as_ref());
         let of_order = fills_of_orders(orders, fills)?;
         let made = made(orders, &of_order, &market.tape);
+        let places = Places::of(orders, &of_order, &market.tape, early);
+        notes.extend(places.note());
         let rows = market_orders(orders, &made, &mut notes)?;
         let rows = on_tape(orders, rows, &market, !made.is_empty(), &mut notes)?;
         let in_flight: Vec<InFlight> = rows.iter().map(|(_, order)| *order).collect();
@@ -119,7 +127,10 @@ impl OrderLog {
         let found_out = || shows_own(&market.tape, &in_flight, &traded, tick_size);
         let shows_own_orders = market.shows_own_orders.unwrap_or_else(found_out);
         let taken = traded.iter().copied();
-        let rested = made.iter().map(|made| early(made.order.decided_at)).map(|at| (at, Traded::Report(at)));
+        let rested = made.iter().map(|made| {
+            let at = early(made.order.decided_at);
+            (crossed(&market.tape, made, at), Traded::Report(at))
+        });
         // Fills of orders that rest follow from the market, whether or not it shows them.
         let looks = match (shows_own_orders, made.is_empty()) {
             (true, _) => looks(&market.tape, &taken.chain(rested).collect::<Vec<_>>(), tick_size),
@@ -132,6 +143,7 @@ impl OrderLog {
             paid: executions.iter().map(|execution| execution.price).collect(),
             made,
             looks,
+            places: places.told().to_vec(),
             aspect: Aspect::Orders,
             shows_own_orders,
             market,
@@ -173,6 +185,7 @@ impl OrderLog {
             orders,
             rows,
             looks: Vec::new(),
+            places: Vec::new(),
             shows_own_orders,
             own_prints,
             shown_delay: None,
@@ -184,7 +197,9 @@ impl OrderLog {
 
     /// When each row is, from the first decision on [s].
     fn times(&self) -> Vec<f64> {
-        let firsts = self.orders.first().into_iter().chain(self.made.first().map(|made| &made.order));
+        let made = self.made.first().map(|made| &made.order);
+        let queued = self.places.first().map(|place| &place.order);
+        let firsts = self.orders.first().into_iter().chain(made).chain(queued);
         let first = firsts.map(|order| order.decided_at).min().unwrap_or_default();
         self.rows.iter().map(|row| self.at(row).seconds_since(first)).collect()
     }
@@ -193,6 +208,7 @@ impl OrderLog {
         match row {
             Row::Order(number) => self.orders[*number].decided_at,
             Row::Made(number) => self.made[*number].order.decided_at,
+            Row::Queued(number) => self.places[*number].order.decided_at,
             Row::Look(look) => look.at,
         }
     }
@@ -271,7 +287,7 @@ impl OrderLog {
     pub fn order_of(&self, row: usize) -> Option<usize> {
         match self.rows.get(row)? {
             Row::Order(number) => Some(*number),
-            Row::Made(_) | Row::Look(_) => None,
+            Row::Made(_) | Row::Queued(_) | Row::Look(_) => None,
         }
     }
 
@@ -335,9 +351,9 @@ impl OrderLog {
         self.orders.iter().any(|order| order.role == role) || role == Role::Maker && self.rests()
     }
 
-    /// Whether a row is a fill of an order that rested.
+    /// Whether a row is of an order that rested.
     fn rests(&self) -> bool {
-        self.rows.iter().any(|row| matches!(row, Row::Made(_)))
+        self.rows.iter().any(|row| matches!(row, Row::Made(_) | Row::Queued(_)))
     }
 
     /// Whether the tape knows the volume an order meets.
@@ -358,62 +374,6 @@ impl OrderLog {
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
-    }
-}
-
-impl Stimulus<Execution> for OrderLog {
-    fn command(&self, row: usize) -> InFlight {
-        match self.rows[row] {
-            Row::Order(number) => self.orders[number],
-            Row::Made(number) => self.made[number].order,
-            Row::Look(look) => InFlight::market(Side::Buy, 0.0, look.at, look.mid, look.mid).as_a(Role::Watcher),
-        }
-    }
-
-    fn input(&self, row: usize, arriving: &InFlight) -> Met {
-        match self.rows[row] {
-            Row::Order(number) => match self.paid[number].filter(|_| self.aspect == Aspect::Fees) {
-                // What is charged is charged for what was paid, whatever it should have been.
-                Some(price) => Met::at(Book::at_price(arriving.decided_at, price), price, f64::INFINITY),
-                None => self.met(number, arriving),
-            },
-            Row::Made(number) => {
-                let Made { order, price, .. } = self.made[number];
-                Met::at(Book::at_price(order.decided_at, price), price, f64::INFINITY)
-            }
-            Row::Look(look) => {
-                let nothing = Met::at(Book::at_price(look.at, look.mid), look.mid, 0.0);
-                Met { scatter: look.scatter, shows_own: self.shows_own_orders, ..nothing }
-            }
-        }
-    }
-}
-
-impl OrderLog {
-    /// What order `number` meets as it arrives.
-    fn met(&self, number: usize, arriving: &InFlight) -> Met {
-        let seen = Seen::by(arriving, self.own_prints[number]);
-        let tape = self.tape();
-        let book = tape.book(seen);
-        // Where the tape has ended or shows one side only, the assumption stays as it was at the decision.
-        let price = self.market.price.price_beside(book.as_ref(), tape, arriving.side, seen);
-        let reference = price.unwrap_or(arriving.assumed);
-        let volume = tape.volume_beside(book.as_ref(), arriving.side, seen);
-        let book = book.unwrap_or_else(|| Book::at_price(seen.end(), reference));
-        // What rests joins the best price of its own side.
-        let joined = book.opposite(arriving.side.opposite()).first().filter(|_| arriving.role == Role::Maker);
-        let displayed = joined.map_or(0.0, |level| level.size);
-        let (seen, shows_own) = (self.moved_since_seen(arriving), self.shows_own_orders);
-        Met { displayed, seen, shows_own, ..Met::at(book, reference, volume) }
-    }
-
-    /// The mid that had been seen when `order` was decided, above what the mid was then [bps].
-    fn moved_since_seen(&self, order: &InFlight) -> f64 {
-        // A log that does not say what was seen is not asked: looking up costs time.
-        if self.shown_age.is_none() || order.seen_until == order.decided_at {
-            return 0.0;
-        }
-        self.tape().mid(Seen::at(order.seen_until)).map_or(0.0, |mid| above(mid, order.mid))
     }
 }
 

@@ -14,8 +14,8 @@ use super::need::{Demanding, Need, known};
 /// gone, and what was added with it.
 ///
 /// On bars nothing is displayed and no queue is known: a run on bars alone refuses the law. A log of market orders cannot tell of
-/// it. In a log with orders that rest, each at the best price of its own side, the first `fraction * displayed` of what would have
-/// filled one fills others.
+/// it. A log with orders that rest, each at the best price of its own side, does where its tape has trades: what was taken at
+/// their price before they were filled stood ahead of them.
 ///
 /// Source: Moallemi & Yuan, "A model for queue position valuation in a limit order book" (2017), for what a place in the queue
 /// is worth; Rigtorp, "Estimating order queue position" (2013), for how it is estimated, and by how much that may be wrong.

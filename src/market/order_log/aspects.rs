@@ -1,4 +1,4 @@
-//! The aspects of an order log: costs, fees, what had been seen, and mids, each a recording of its own.
+//! The aspects of an order log: costs, fees, what had been seen, places in queues, and mids, each a recording of its own.
 
 use crate::market::log_rows::forget_rounded;
 use crate::market::look::Look;
@@ -18,13 +18,15 @@ pub(super) enum Aspect {
     Fees,
     /// What had been seen when orders were decided.
     Seen,
+    /// Where orders that rested stood in their queues.
+    Queues,
     /// What the mid did.
     Mids,
 }
 
 impl OrderLog {
     /// What the recording of a log shows that has no law in common: what orders cost and how much of them was filled; what they were
-    /// charged, of what was filled; the mids they had seen; and what the mid did after them.
+    /// charged, of what was filled; the mids they had seen; where they stood in their queues; and what the mid did after them.
     #[must_use]
     pub fn aspects(recording: &Recording<Self>) -> Vec<Recording<Self>> {
         let log = &recording.stimulus;
@@ -41,7 +43,11 @@ impl OrderLog {
         let mut mid = of(executed.with_rows(&log.looks), Aspect::Mids, &[]);
         mid.stimulus.notes.clear();
         mid.measured.extend(mid.stimulus.mids());
-        vec![of(log.clone(), Aspect::Costs, &["cost", "filled"]), fee, of(log.clone(), Aspect::Seen, &["seen"]), mid]
+        let queued = Self { rows: (0..log.places.len()).map(Row::Queued).collect(), notes: Vec::new(), ..log.clone() };
+        let mut ahead = of(queued, Aspect::Queues, &[]);
+        ahead.measured.extend(log.ahead());
+        let of_orders = |aspect, channels| of(log.clone(), aspect, channels);
+        vec![of_orders(Aspect::Costs, &["cost", "filled"]), fee, of_orders(Aspect::Seen, &["seen"]), ahead, mid]
     }
 
     /// Whether mechanisms of that site may change anything of what is looked at.
@@ -51,7 +57,7 @@ impl OrderLog {
             Aspect::Orders => true,
             Aspect::Costs => site != Site::Observation,
             Aspect::Fees | Aspect::Seen => site == Site::Observation,
-            Aspect::Mids => site == Site::Plant,
+            Aspect::Queues | Aspect::Mids => site == Site::Plant,
         }
     }
 
@@ -70,16 +76,22 @@ impl OrderLog {
         let fee = |row: &Row| match row {
             Row::Order(number) => of_orders.get(*number).copied().flatten(),
             Row::Made(number) => fee_bps(self.made[*number].fee, self.made[*number].notional()),
-            Row::Look(_) => None,
+            Row::Queued(_) | Row::Look(_) => None,
         };
         let mut samples: Vec<Option<f64>> = self.rows.iter().map(fee).collect();
         let notional = |row: &Row| match row {
             Row::Order(number) => self.orders[*number].quantity * self.orders[*number].mid,
             Row::Made(number) => self.made[*number].notional(),
-            Row::Look(_) => 0.0,
+            Row::Queued(_) | Row::Look(_) => 0.0,
         };
         forget_rounded(&mut samples, &self.rows.iter().map(notional).collect::<Vec<_>>());
         Some(Measured { channel: "fee".into(), unit: "bps".into(), samples }).filter(|fee| !fee.samples.is_empty())
+    }
+
+    /// What stood ahead of orders that rested beside what was displayed, where anything did.
+    fn ahead(&self) -> Option<Measured> {
+        let samples: Vec<Option<f64>> = self.places.iter().map(|place| Some(place.beyond)).collect();
+        Some(Measured { channel: "ahead".into(), unit: String::new(), samples }).filter(|ahead| !ahead.samples.is_empty())
     }
 
     /// The same orders, each of the quantity that was filled of it.
@@ -92,7 +104,7 @@ impl OrderLog {
     /// What the mid moved from look to look, where anybody looked.
     fn mids(&self) -> Option<Measured> {
         let moved = |row: &Row| match row {
-            Row::Order(_) | Row::Made(_) => None,
+            Row::Order(_) | Row::Made(_) | Row::Queued(_) => None,
             Row::Look(look) => look.moved.map(|moved| moved / look.scatter),
         };
         let samples: Vec<Option<f64>> = self.rows.iter().map(moved).collect();
