@@ -43,6 +43,7 @@ mod ledger;
 mod line;
 #[cfg(feature = "io")]
 mod listed;
+mod log_clock;
 mod log_entry;
 #[cfg(feature = "io")]
 mod log_folder;

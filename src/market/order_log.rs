@@ -6,6 +6,7 @@ use crate::sim2real::{Measured, Recording, Timestamp};
 
 use aspects::Aspect;
 
+use super::log_clock::Clocked;
 use super::log_entry::fills_of_orders;
 use super::log_rows::{Made, Outcome, Stamps, made, market_orders, on_tape};
 use super::look::{Look, Traded, crossed, looks, shows_own};
@@ -99,6 +100,9 @@ impl OrderLog {
         fills_of_orders(orders, fills)?;
         let mut notes = market.tape.notes().to_vec();
         let Stamps { orders, fills, early } = Stamps::of(orders, fills, &market.tape, &mut notes);
+        let (orders, fills) = (orders.as_ref(), fills.as_ref());
+        let of_order = fills_of_orders(orders, fills)?;
+        let Clocked { orders, fills } = Clocked::of(orders, fills, &of_order, &market.tape, early, &mut notes);
         let (orders, fills) = (orders.as_ref(), fills.as_ref());
         let of_order = fills_of_orders(orders, fills)?;
         let made = made(orders, &of_order, &market.tape);

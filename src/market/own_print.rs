@@ -41,7 +41,7 @@ pub fn own_print(
 
 /// Whether `prints` begin with the fills: each fill may be the sum of neighbouring prints at its price, for a tape shows a
 /// print for every resting order that was met, and many brokers one fill for each price.
-fn shows(prints: &[Print], side: Side, fills: &[Piece]) -> bool {
+pub(super) fn shows(prints: &[Print], side: Side, fills: &[Piece]) -> bool {
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs();
     let mut prints = prints.iter();
     let mut shown = |fill: &Piece| {
