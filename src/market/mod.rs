@@ -13,6 +13,7 @@ mod booking;
 mod by_id;
 mod calendar;
 mod carry;
+mod censored;
 mod check;
 mod checkpoint;
 mod corporate_action;

@@ -2,25 +2,23 @@
 
 use crate::sim2real::Timestamp;
 
+use super::censored::{Bounds, Spread};
 use super::{InFlight, LoggedFill, LoggedOrder, OrderType, Print, Role, Seen, Side, Tape};
 
-/// With fewer orders of a known place nothing is told of places.
-const ENOUGH: usize = 25;
-/// A place is known where it lies between bounds that are no further apart than this part of what was displayed.
-const KNOWN_TO: f64 = 0.2;
-/// More than was displayed stood ahead where it did by so many standard errors, and by this part of it.
-const CERTAIN: f64 = 4.0;
+/// With fewer orders that tell of their places nothing is told of places.
+const ENOUGH: usize = 15;
+/// What is known to have stood ahead at the least tells something where that is no less than this part of what was displayed.
+const TELLING: f64 = 0.5;
+/// Places are told of where a mean of their own makes them so much likelier than none, in twice the logarithm (four standard
+/// errors), and where that mean is this part of what was displayed.
+const CERTAIN: f64 = 16.0;
 const WORTH_TELLING: f64 = 0.05;
-/// What stood ahead of one order counts for no more than so many times what stood ahead of the middle one.
-const USUAL: f64 = 5.0;
 
 /// The place in its queue of an order that rested at the best price of its own side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     /// The order, as of when it was decided.
     pub order: InFlight,
-    /// When it was filled first.
-    pub filled_at: Timestamp,
     /// What was displayed where it joined [units].
     pub displayed: f64,
     /// What stood ahead of it beside that, as a part of it.
@@ -42,14 +40,24 @@ pub(super) enum Places {
 impl Places {
     /// Of limit orders, each with its `fills`. Stamps of fills may be too early by `rounding` [ns].
     pub fn of(orders: &[LoggedOrder], fills: &[Vec<&LoggedFill>], tape: &Tape, rounding: i64) -> Self {
-        let known = orders.iter().zip(fills).filter_map(|(order, fills)| place(order, fills, tape, rounding));
-        let mut places: Vec<Place> = known.collect();
-        places.sort_by_key(|place| place.order.decided_at);
-        let Some((mean, error)) = mean(&places) else { return Self::Silent };
-        if mean.abs() < WORTH_TELLING + CERTAIN * error {
+        let known = orders.iter().zip(fills).filter_map(|(order, fills)| ahead(order, fills, tape, rounding));
+        let known: Vec<Ahead> = known.filter(|one| one.most.is_finite() || one.least > TELLING * one.displayed).collect();
+        if known.len() < ENOUGH {
             return Self::Silent;
         }
-        if mean > 0.0 { Self::Late(places) } else { Self::Early(-mean) }
+        let bounds: Vec<Bounds> = known.iter().map(Ahead::beyond).collect();
+        let Some((own, none)) = Spread::fit(&bounds, None).zip(Spread::fit(&bounds, Some(0.0))) else { return Self::Silent };
+        let likelier = 2.0 * (own.log_likelihood - none.log_likelihood);
+        if likelier < CERTAIN || own.mean.abs() < WORTH_TELLING {
+            return Self::Silent;
+        }
+        if own.mean < 0.0 {
+            return Self::Early(-own.mean);
+        }
+        let place = |(one, beyond): (&Ahead, f64)| Place { order: one.order, displayed: one.displayed, beyond };
+        let mut places: Vec<Place> = known.iter().zip(own.values(&bounds)).map(place).collect();
+        places.sort_by_key(|place| place.order.decided_at);
+        Self::Late(places)
     }
 
     /// The places, where they tell of something that a place further back could say.
@@ -68,73 +76,77 @@ impl Places {
     }
 }
 
-/// What stood ahead beside what was displayed, on average, and its standard error; none of few orders.
-fn mean(places: &[Place]) -> Option<(f64, f64)> {
-    if places.len() < ENOUGH {
-        return None;
-    }
-    let mut ahead: Vec<f64> = places.iter().map(|place| 1.0 + place.beyond).collect();
-    ahead.sort_by(f64::total_cmp);
-    let most = USUAL * ahead[ahead.len() / 2];
-    let beyond = || ahead.iter().map(|ahead| ahead.min(most) - 1.0);
-    let count = places.len() as f64;
-    let mean = beyond().sum::<f64>() / count;
-    let variance = beyond().map(|beyond| (beyond - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    Some((mean, (variance / count).sqrt()))
+/// What stood ahead of an order, as far as the tape tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ahead {
+    /// The order, as of when it was decided.
+    order: InFlight,
+    /// What was displayed where it joined [units].
+    displayed: f64,
+    /// What stood ahead of it at the least, and at the most [units]; infinite where that is not known.
+    least: f64,
+    most: f64,
 }
 
-/// The place of `order`, where the tape tells it: it joined the best price of its own side, which was never left until somebody
-/// who took filled it.
-fn place(order: &LoggedOrder, fills: &[&LoggedFill], tape: &Tape, rounding: i64) -> Option<Place> {
+impl Ahead {
+    /// What stood ahead beside what was displayed, as a part of it.
+    fn beyond(&self) -> Bounds {
+        (self.least / self.displayed - 1.0, self.most / self.displayed - 1.0)
+    }
+}
+
+/// What stood ahead of `order`, which joined the best price of its own side: all that was taken there before somebody filled it.
+/// Where the market left that price first, no less than was taken until then.
+fn ahead(order: &LoggedOrder, fills: &[&LoggedFill], tape: &Tape, rounding: i64) -> Option<Ahead> {
     let first = fills.first().filter(|_| order.kind == OrderType::Other("limit".to_owned()))?;
     let (limit, decided) = (first.price, order.decided_at);
     let book = tape.book(Seen::at(decided))?;
     let joined = book.opposite(order.side.opposite()).first().filter(|level| close(level.price, limit))?;
     let displayed = Some(joined.size).filter(|size| size.is_finite() && *size > 0.0)?;
-    let until = first.filled_at + rounding + STAMP;
-    if left(tape, order.side, limit, decided, until) {
-        return None;
-    }
-    let (before, last) = traded(tape.prints(), order.side, limit, decided, until)?;
-    let most = before + last - first.quantity;
-    // Who got the rest of what somebody took stood behind all the rest of it; who was filled whole may have stood further ahead.
-    let least = if first.quantity < order.quantity { most } else { before };
-    let known = most >= least && most - least <= KNOWN_TO * displayed;
-    let mid = book.mid().filter(|_| known)?;
-    Some(Place {
-        order: InFlight::market(order.side, order.quantity, decided, limit, mid).as_a(Role::Maker),
-        filled_at: first.filled_at,
-        displayed,
-        beyond: 0.5 * (least + most) / displayed - 1.0,
-    })
+    let filled = first.filled_at + rounding + STAMP;
+    let left = left_at(tape, order.side, limit, decided, filled);
+    let (before, last) = taken(tape.prints(), order.side, limit, decided, left.map_or(filled, |at| Timestamp(at.0 - 1)));
+    let whole = first.quantity >= order.quantity;
+    let (least, most) = match (left, whole) {
+        (Some(_), _) => (before + last, f64::INFINITY),
+        // It was filled, and nobody who took is known.
+        (None, _) if last < first.quantity => return None,
+        // Who got the rest of what somebody took stood behind all the rest of it; who was filled whole may have stood further ahead.
+        (None, true) => (before, before + last - first.quantity),
+        (None, false) => (before + last - first.quantity, before + last - first.quantity),
+    };
+    let sent = InFlight::market(order.side, order.quantity, decided, limit, book.mid()?).as_a(Role::Maker);
+    Some(Ahead { order: sent, displayed, least, most })
 }
 
 /// By how much a stamp may have been rounded [ns]: the step of a 64-bit float at today's count of nanoseconds.
 const STAMP: i64 = 256;
 
-/// Whether the best price of an order's own side left its `limit`, or the other side came to it, by a time: then a queue is gone.
-fn left(tape: &Tape, side: Side, limit: f64, from: Timestamp, to: Timestamp) -> bool {
+/// When the best price of an order's own side left its `limit`, or the other side came to it, if by a time: then a queue is gone.
+fn left_at(tape: &Tape, side: Side, limit: f64, from: Timestamp, to: Timestamp) -> Option<Timestamp> {
     let times = tape.quotes().times();
     let (first, end) = (times.partition_point(|at| *at <= from), times.partition_point(|at| *at <= to));
     let quotes = tape.quotes().between(first, end.max(first));
     let worse = |price: f64, than: f64| side.sign() * (price - than) < 0.0 && !close(price, than);
-    (0..quotes.len()).filter_map(|k| quotes.get(k)).any(|quote| {
+    let gone = |k: &usize| {
+        let Some(quote) = quotes.get(*k) else { return false };
         let (own, other) = match side {
             Side::Buy => (quote.bid(), quote.ask()),
             Side::Sell => (quote.ask(), quote.bid()),
         };
         own.is_none_or(|own| worse(own, limit)) || other.is_some_and(|other| !worse(limit, other))
-    })
+    };
+    (0..quotes.len()).find(gone).and_then(|k| quotes.times().get(k).copied())
 }
 
-/// What was taken at `limit` from an order's side: before the last time, and then [units]; none where nothing was.
-fn traded(prints: &[Print], side: Side, limit: f64, from: Timestamp, to: Timestamp) -> Option<(f64, f64)> {
+/// What was taken at `limit` from an order's side: before the last time, and then [units].
+fn taken(prints: &[Print], side: Side, limit: f64, from: Timestamp, to: Timestamp) -> (f64, f64) {
     let (first, end) = (prints.partition_point(|p| p.time <= from), prints.partition_point(|p| p.time <= to));
     let met = |print: &&Print| close(print.price, limit) && print.aggressor.is_none_or(|taker| taker != side);
     let met: Vec<&Print> = prints[first..end.max(first)].iter().filter(met).collect();
-    let last = met.last()?.time;
-    let sum = |at_last: bool| met.iter().filter(|print| (print.time == last) == at_last).map(|print| print.size).sum();
-    Some((sum(false), sum(true)))
+    let last = met.last().map(|print| print.time);
+    let sum = |at_last: bool| met.iter().filter(|p| (Some(p.time) == last) == at_last).map(|print| print.size).sum();
+    (sum(false), sum(true))
 }
 
 fn close(a: f64, b: f64) -> bool {
@@ -175,49 +187,34 @@ mod tests {
         LoggedFill { order_id: "1".into(), filled_at: at(time), quantity, price: 100.0, fee: 0.0 }
     }
 
+    /// What stood ahead of an order, at the least and at the most.
+    fn bounds(asks: &[(f64, f64)], trades: &[(f64, f64)], fill: &LoggedFill) -> Option<Bounds> {
+        ahead(&order(), &[fill], &tape(asks, trades), 0).map(|ahead| (ahead.least, ahead.most))
+    }
+
+    const CALM: [(f64, f64); 2] = [(0.0, 100.01), (20.0, 100.01)];
+
     #[test]
     fn what_traded_before_it_stood_ahead_of_it() {
-        let tape = tape(&[(0.0, 100.01), (20.0, 100.01)], &[(0.5, 500.0), (2.0, 50.0), (3.0, 15.0)]);
-        // Of the 15 sold last it got 10: 55 stood ahead, 40 of them displayed.
-        let place = place(&order(), &[&filled(3.0, 10.0)], &tape, 0).expect("a place");
-        assert_eq!((place.displayed, place.beyond), (40.0, 0.375));
-        // Filled whole it stood somewhere between 50 and 50 + 40 - 30: known to no more than that.
-        let whole = |size| tape_and_place(size, 30.0);
-        assert_eq!(whole(34.0).map(|place| place.beyond), Some(0.5 * (50.0 + 54.0) / 40.0 - 1.0));
-        assert_eq!(whole(60.0), None);
-    }
-
-    fn tape_and_place(size: f64, quantity: f64) -> Option<Place> {
-        let tape = tape(&[(0.0, 100.01), (20.0, 100.01)], &[(2.0, 50.0), (3.0, size)]);
-        place(&order(), &[&filled(3.0, quantity)], &tape, 0)
-    }
-
-    #[test]
-    fn a_queue_that_the_market_has_left_tells_nothing() {
-        let trades = [(2.0, 50.0), (3.0, 15.0)];
-        let fill = filled(3.0, 10.0);
-        for ask in [100.0, 99.99] {
-            let crossed = tape(&[(0.0, 100.01), (2.5, ask)], &trades);
-            assert_eq!(place(&order(), &[&fill], &crossed, 0), None, "{ask}");
-        }
+        // Of the 15 sold last it got 10.
+        let trades = [(0.5, 500.0), (2.0, 50.0), (3.0, 15.0)];
+        assert_eq!(bounds(&CALM, &trades, &filled(3.0, 10.0)), Some((55.0, 55.0)));
+        // Filled whole it stood somewhere between.
+        assert_eq!(bounds(&CALM, &[(2.0, 50.0), (3.0, 34.0)], &filled(3.0, 30.0)), Some((50.0, 54.0)));
+        assert_eq!(bounds(&CALM, &[(2.0, 50.0)], &filled(3.0, 30.0)), Some((0.0, 20.0)));
+        // A fill that nobody on the tape has brought tells nothing.
+        assert_eq!(bounds(&CALM, &[(2.0, 5.0)], &filled(3.0, 30.0)), None);
         let market = LoggedOrder { kind: OrderType::Market, ..order() };
-        let calm = tape(&[(0.0, 100.01)], &trades);
-        assert_eq!(place(&market, &[&fill], &calm, 0), None);
-        assert_eq!(place(&order(), &[], &calm, 0), None);
+        assert_eq!(ahead(&market, &[&filled(3.0, 10.0)], &tape(&CALM, &trades), 0), None);
+        assert_eq!(ahead(&order(), &[], &tape(&CALM, &trades), 0), None);
     }
 
     #[test]
-    fn chance_is_no_place() {
-        let place = |beyond: f64| Place {
-            order: InFlight::market(Side::Buy, 1.0, at(0.0), 1.0, 1.0),
-            filled_at: at(0.0),
-            displayed: 1.0,
-            beyond,
-        };
-        let mean_of = |of: &dyn Fn(usize) -> f64| mean(&(0..100).map(|k| place(of(k))).collect::<Vec<_>>());
-        assert_eq!(mean_of(&|_| 0.5), Some((0.5, 0.0)));
-        let (mean, error) = mean_of(&|k| if k % 2 == 0 { 1.0 } else { -1.0 }).expect("enough");
-        assert!(mean.abs() < CERTAIN * error);
-        assert_eq!(super::mean(&[place(1.0)]), None);
+    fn of_a_queue_that_the_market_has_left_no_more_is_known_than_what_was_taken_before() {
+        for ask in [100.0, 99.99] {
+            let crossed = [(0.0, 100.01), (2.5, ask)];
+            let known = bounds(&crossed, &[(2.0, 50.0), (3.0, 15.0)], &filled(3.0, 10.0));
+            assert_eq!(known, Some((50.0, f64::INFINITY)), "{ask}");
+        }
     }
 }
