@@ -106,14 +106,30 @@ pub(super) struct Made {
     pub order: InFlight,
     /// At what price [currency].
     pub price: f64,
-    /// What was charged [currency].
+    /// What the order was charged; told with the first of its fills, and only where all of them rested.
+    pub charged: Option<Charged>,
+}
+
+/// What an order was charged: some brokers say it with its first fill, others with each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Charged {
+    /// What was filled of it in all [units].
+    pub quantity: f64,
+    /// What changed hands [currency].
+    pub notional: f64,
+    /// In all [currency].
     pub fee: f64,
 }
 
-impl Made {
-    /// What changed hands [currency].
-    pub fn notional(&self) -> f64 {
-        self.price * self.order.quantity
+impl Charged {
+    fn of(fills: &[&LoggedFill]) -> Self {
+        let sum = |value: &dyn Fn(&LoggedFill) -> f64| fills.iter().map(|fill| value(fill)).sum();
+        Self { quantity: sum(&|f| f.quantity), notional: sum(&|f| f.quantity * f.price), fee: sum(&|f| f.fee) }
+    }
+
+    /// Average price [currency].
+    pub fn price(&self) -> f64 {
+        self.notional / self.quantity
     }
 }
 
@@ -128,10 +144,11 @@ pub(super) fn made(orders: &[LoggedOrder], fills: &[Vec<&LoggedFill>], tape: &Ta
         let displayed =
             tape.book(Seen::at(order.decided_at)).and_then(|book| Some(book.opposite(order.side).first()?.price));
         let took = |fill: &LoggedFill| displayed.is_some_and(|price| order.side.sign() * (fill.price - price) >= 0.0);
+        let mut charged = (!fills.iter().any(|fill| took(fill))).then(|| Charged::of(fills));
         for fill in fills.iter().filter(|fill| !took(fill)) {
             let Some(mid) = tape.mid(Seen::at(fill.filled_at)) else { continue };
             let filled = InFlight::market(order.side, fill.quantity, fill.filled_at, fill.price, mid).as_a(Role::Maker);
-            made.push(Made { order: filled, price: fill.price, fee: fill.fee });
+            made.push(Made { order: filled, price: fill.price, charged: charged.take() });
         }
     }
     made.sort_by_key(|made| made.order.decided_at);

@@ -53,6 +53,8 @@ pub struct OrderLog {
     /// What of the log is looked at.
     aspect: Aspect,
     shows_own_orders: bool,
+    /// Whether orders were filled at parts of ticks.
+    within_ticks: bool,
     own_prints: Vec<Option<Timestamp>>,
     shown_delay: Option<f64>,
     shown_age: Option<f64>,
@@ -150,6 +152,7 @@ impl OrderLog {
             places: places.told().to_vec(),
             aspect: Aspect::Orders,
             shows_own_orders,
+            within_ticks: within_ticks(&executions, tick_size),
             market,
             shown_delay,
             shown_age: None,
@@ -191,6 +194,7 @@ impl OrderLog {
             looks: Vec::new(),
             places: Vec::new(),
             shows_own_orders,
+            within_ticks: false,
             own_prints,
             shown_delay: None,
             shown_age: None,
@@ -313,6 +317,12 @@ impl OrderLog {
         self.shows_own_orders
     }
 
+    /// The step in which prices of its fills are told [currency].
+    #[must_use]
+    pub fn price_step(&self) -> f64 {
+        self.market.instrument.tick_size * if self.within_ticks { FINER } else { 1.0 }
+    }
+
     /// The first print of each order's own trades, where it was found on the tape.
     #[must_use]
     pub fn own_prints(&self) -> &[Option<Timestamp>] {
@@ -384,4 +394,16 @@ impl OrderLog {
 /// How far `price` is above `mid` [bps of it].
 fn above(price: f64, mid: f64) -> f64 {
     (price - mid) / mid * 1e4
+}
+
+/// Fills are at parts of ticks where this part of them is off the ticks by more than that, in ticks; their step is then as fine.
+const OFF_TICKS: f64 = 0.1;
+const FINER: f64 = 1e-3;
+
+/// Whether orders were filled at parts of ticks.
+fn within_ticks(executions: &[Outcome], tick_size: f64) -> bool {
+    let pieces = || executions.iter().flat_map(|execution| &execution.pieces);
+    let off = |price: f64| ((price / tick_size) - (price / tick_size).round()).abs() > FINER;
+    let off = pieces().filter(|piece| off(piece.price)).count();
+    off > 0 && off as f64 >= OFF_TICKS * pieces().count() as f64
 }

@@ -75,13 +75,13 @@ impl OrderLog {
     fn fees(&self, of_orders: &[Option<f64>]) -> Option<Measured> {
         let fee = |row: &Row| match row {
             Row::Order(number) => of_orders.get(*number).copied().flatten(),
-            Row::Made(number) => fee_bps(self.made[*number].fee, self.made[*number].notional()),
+            Row::Made(number) => self.made[*number].charged.and_then(|charged| fee_bps(charged.fee, charged.notional)),
             Row::Queued(_) | Row::Look(_) => None,
         };
         let mut samples: Vec<Option<f64>> = self.rows.iter().map(fee).collect();
         let notional = |row: &Row| match row {
-            Row::Order(number) => self.orders[*number].quantity * self.orders[*number].mid,
-            Row::Made(number) => self.made[*number].notional(),
+            Row::Order(number) => self.executed[*number] * self.paid[*number].unwrap_or(0.0),
+            Row::Made(number) => self.made[*number].charged.map_or(0.0, |charged| charged.notional),
             Row::Queued(_) | Row::Look(_) => 0.0,
         };
         forget_rounded(&mut samples, &self.rows.iter().map(notional).collect::<Vec<_>>());

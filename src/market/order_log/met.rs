@@ -12,7 +12,7 @@ impl Stimulus<Execution> for OrderLog {
     fn command(&self, row: usize) -> InFlight {
         match self.rows[row] {
             Row::Order(number) => self.orders[number],
-            Row::Made(number) => self.made[number].order,
+            Row::Made(number) => self.made(number).0,
             Row::Queued(number) => self.places[number].order,
             Row::Look(look) => InFlight::market(Side::Buy, 0.0, look.at, look.mid, look.mid).as_a(Role::Watcher),
         }
@@ -26,7 +26,7 @@ impl Stimulus<Execution> for OrderLog {
                 None => self.met(number, arriving),
             },
             Row::Made(number) => {
-                let Made { order, price, .. } = self.made[number];
+                let (order, price) = self.made(number);
                 Met::at(Book::at_price(order.decided_at, price), price, f64::INFINITY)
             }
             Row::Queued(number) => {
@@ -43,6 +43,15 @@ impl Stimulus<Execution> for OrderLog {
 }
 
 impl OrderLog {
+    /// The fill of that number of an order that rested, and its price [currency]; where fees are looked at, all the fills of its order.
+    fn made(&self, number: usize) -> (InFlight, f64) {
+        let Made { order, price, charged } = self.made[number];
+        match charged.filter(|_| self.aspect == Aspect::Fees) {
+            Some(charged) => (InFlight { quantity: charged.quantity, ..order }, charged.price()),
+            None => (order, price),
+        }
+    }
+
     /// What order `number` meets as it arrives.
     fn met(&self, number: usize, arriving: &InFlight) -> Met {
         let seen = Seen::by(arriving, self.own_prints[number]);
