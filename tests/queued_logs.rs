@@ -56,12 +56,17 @@ fn at(round: usize) -> Timestamp {
     Timestamp(1_722_951_000 * Timestamp::NANOS).plus_seconds(round as f64 * ROUND)
 }
 
+/// Whoever trades comes after the quotes of the round, and the client after that.
+fn traded_at(round: usize) -> Timestamp {
+    at(round).plus_seconds(0.1)
+}
+
 impl Written {
-    fn filled(&mut self, round: usize, quantity: f64) {
+    fn filled(&mut self, filled_at: Timestamp, quantity: f64) {
         let Some(order) = &mut self.waiting else { return };
         order.left -= quantity;
         let (order_id, price) = (order.number.to_string(), order.limit as f64 * 0.01);
-        self.fills.push(LoggedFill { order_id, filled_at: at(round), quantity, price, fee: 0.0 });
+        self.fills.push(LoggedFill { order_id, filled_at, quantity, price, fee: 0.0 });
         self.waiting.take_if(|order| order.left < 1.0);
     }
 
@@ -73,19 +78,19 @@ impl Written {
         };
         self.waiting.take_if(|order| round > order.until);
         if let Some(left) = self.waiting.as_ref().filter(|order| reached(order)).map(|order| order.left) {
-            self.filled(round, left);
+            self.filled(at(round), left);
         }
     }
 
     fn traded(&mut self, round: usize, aggressor: Side, price: i64, size: f64) {
-        self.prints.push(Print { time: at(round), price: price as f64 * 0.01, size, aggressor: Some(aggressor) });
+        self.prints.push(Print { time: traded_at(round), price: price as f64 * 0.01, size, aggressor: Some(aggressor) });
         let met = |order: &&mut Waiting| order.side != aggressor && order.limit == price;
         let Some(order) = self.waiting.as_mut().filter(met) else { return };
         let used = size.min(order.ahead);
         order.ahead -= used;
         let quantity = order.left.min((size - used).floor());
         if quantity >= 1.0 {
-            self.filled(round, quantity);
+            self.filled(traded_at(round), quantity);
         }
     }
 }
@@ -118,7 +123,7 @@ fn log(times: f64, seed: u64) -> Recording<OrderLog> {
                 id: number.to_string(),
                 side,
                 quantity,
-                decided_at: at(round),
+                decided_at: at(round).plus_seconds(0.2),
                 kind: OrderType::Other("limit".into()),
                 seen_mid: None,
             });

@@ -289,8 +289,7 @@ impl Execution {
 
     /// To what precision a log can tell a channel, in its unit: no fit of it can be better than that.
     ///
-    /// - `cost` and `seen` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid; of costs that
-    ///   were filled at parts of ticks, as some paper venues do, a thousandth of that;
+    /// - `cost` and `seen` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
     /// - `fee` [bps]: half a cent over the notional;
     /// - `filled` []: half a lot over the quantity;
     /// - `mid`: a part of what the mid does of itself, in which it is told;
@@ -301,8 +300,7 @@ impl Execution {
     pub fn resolution_of(recording: &Recording<OrderLog>, channel: &str) -> f64 {
         let instrument = recording.stimulus.instrument();
         let of = |order: &InFlight| match channel {
-            "cost" => recording.stimulus.price_step() / 12.0_f64.sqrt() / order.mid * 1e4,
-            "seen" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
+            "cost" | "seen" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
             "fee" => Self::FEE_ROUNDING / (order.quantity * order.mid) * 1e4,
             "filled" => 0.5 * instrument.lot_size / order.quantity,
             // It is told in what the mid does of itself, of which its rounding is a part.

@@ -77,9 +77,9 @@ impl Traded {
     }
 }
 
-/// From when on what the mid does may come from a fill that was reported at a time, of an order that rested: just after the market
-/// came to its price, if that is what filled it, since that move is why it was filled and nothing it did.
-pub(super) fn crossed(tape: &Tape, made: &Made, reported: Timestamp) -> Timestamp {
+/// When the market had come to the price of a fill that was reported at a time, if it came with it: what the mid did until then is why
+/// an order that rested was filled, and nothing that followed from it.
+pub(super) fn market_came(tape: &Tape, made: &Made, reported: Timestamp) -> Option<Timestamp> {
     let times = tape.quotes().times();
     let rounding = if reported.0 % Timestamp::NANOS == 0 { Timestamp::NANOS } else { 1 };
     let end = times.partition_point(|at| at.0 < reported.0 + rounding);
@@ -91,7 +91,8 @@ pub(super) fn crossed(tape: &Tape, made: &Made, reported: Timestamp) -> Timestam
         other.is_some_and(|other| made.order.side.sign() * (other - made.price) <= 0.0)
     };
     let came = (0..quotes.len()).find(comes).and_then(|k| quotes.times().get(k).copied());
-    came.map_or(reported, |at| Timestamp(at.0 + 2).max(reported))
+    // A look before it comes a nanosecond earlier, and sees the quote.
+    came.map(|at| Timestamp(at.0 + 2).max(reported))
 }
 
 /// The looks at the mid of `tape` that tell what it does after `orders`, each with when it was decided and when it traded, in order

@@ -9,7 +9,7 @@ use aspects::Aspect;
 use super::log_clock::Clocked;
 use super::log_entry::fills_of_orders;
 use super::log_rows::{Made, Outcome, Stamps, made, market_orders, on_tape};
-use super::look::{Look, Traded, crossed, looks, shows_own};
+use super::look::{Look, Traded, looks, market_came, shows_own};
 use super::queue_place::{Place, Places};
 use super::shown_age::{ShownAge, shown_age};
 use super::{
@@ -53,8 +53,6 @@ pub struct OrderLog {
     /// What of the log is looked at.
     aspect: Aspect,
     shows_own_orders: bool,
-    /// Whether orders were filled at parts of ticks.
-    within_ticks: bool,
     own_prints: Vec<Option<Timestamp>>,
     shown_delay: Option<f64>,
     shown_age: Option<f64>,
@@ -107,7 +105,7 @@ impl OrderLog {
         let Clocked { orders, fills } = Clocked::of(orders, fills, &of_order, &market.tape, early, &mut notes);
         let (orders, fills) = (orders.as_ref(), fills.as_ref());
         let of_order = fills_of_orders(orders, fills)?;
-        let made = made(orders, &of_order, &market.tape);
+        let mut made = made(orders, &of_order, &market.tape);
         let places = Places::of(orders, &of_order, &market.tape, early);
         notes.extend(places.note());
         let rows = market_orders(orders, &made, &mut notes)?;
@@ -133,14 +131,20 @@ impl OrderLog {
         let found_out = || shows_own(&market.tape, &in_flight, &traded, tick_size);
         let shows_own_orders = market.shows_own_orders.unwrap_or_else(found_out);
         let taken = traded.iter().copied();
-        let rested = made.iter().map(|made| {
-            let at = early(made.order.decided_at);
-            (crossed(&market.tape, made, at), Traded::Report(at))
-        });
+        let mut rested = Vec::with_capacity(made.len());
+        for made in &mut made {
+            let reported = early(made.order.decided_at);
+            if let Some(came) = market_came(&market.tape, made, reported) {
+                made.order.decided_at = came.max(made.order.decided_at);
+                rested.push((came, Traded::Report(reported)));
+            } else {
+                rested.push((reported, Traded::Report(reported)));
+            }
+        }
         // Fills of orders that rest follow from the market, whether or not it shows them.
         let looks = match (shows_own_orders, made.is_empty()) {
             (true, _) => looks(&market.tape, &taken.chain(rested).collect::<Vec<_>>(), tick_size),
-            (false, false) => looks(&market.tape, &rested.collect::<Vec<_>>(), tick_size),
+            (false, false) => looks(&market.tape, &rested, tick_size),
             (false, true) => Vec::new(),
         };
         let mut log = Self {
@@ -152,7 +156,6 @@ impl OrderLog {
             places: places.told().to_vec(),
             aspect: Aspect::Orders,
             shows_own_orders,
-            within_ticks: within_ticks(&executions, tick_size),
             market,
             shown_delay,
             shown_age: None,
@@ -194,7 +197,6 @@ impl OrderLog {
             looks: Vec::new(),
             places: Vec::new(),
             shows_own_orders,
-            within_ticks: false,
             own_prints,
             shown_delay: None,
             shown_age: None,
@@ -317,12 +319,6 @@ impl OrderLog {
         self.shows_own_orders
     }
 
-    /// The step in which prices of its fills are told [currency].
-    #[must_use]
-    pub fn price_step(&self) -> f64 {
-        self.market.instrument.tick_size * if self.within_ticks { FINER } else { 1.0 }
-    }
-
     /// The first print of each order's own trades, where it was found on the tape.
     #[must_use]
     pub fn own_prints(&self) -> &[Option<Timestamp>] {
@@ -394,16 +390,4 @@ impl OrderLog {
 /// How far `price` is above `mid` [bps of it].
 fn above(price: f64, mid: f64) -> f64 {
     (price - mid) / mid * 1e4
-}
-
-/// Fills are at parts of ticks where this part of them is off the ticks by more than that, in ticks; their step is then as fine.
-const OFF_TICKS: f64 = 0.1;
-const FINER: f64 = 1e-3;
-
-/// Whether orders were filled at parts of ticks.
-fn within_ticks(executions: &[Outcome], tick_size: f64) -> bool {
-    let pieces = || executions.iter().flat_map(|execution| &execution.pieces);
-    let off = |price: f64| ((price / tick_size) - (price / tick_size).round()).abs() > FINER;
-    let off = pieces().filter(|piece| off(piece.price)).count();
-    off > 0 && off as f64 >= OFF_TICKS * pieces().count() as f64
 }
