@@ -1,0 +1,2 @@
+//! Randomization.
+pub mod image;
