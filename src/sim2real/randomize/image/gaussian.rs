@@ -40,7 +40,7 @@ const QUANTILES: usize = 4_096;
 /// Quantiles of the standard normal distribution, in the middle of each 4,096th of its probability, stretched by less than
 /// 0.1 % so that their variance is 1.
 ///
-/// What such draws are: mean 0 and variance 1 exactly, all odd moments 0; a fourth moment of 2.98, not 3; no draw beyond 3.7
+/// What such draws are: mean 0 and variance 1 exactly, all odd moments 0; a fourth moment of 2.99, not 3; no draw beyond 3.7
 /// standard deviations, where the normal distribution has one in 4,600. Against the 256 values of a byte the steps between
 /// them do not count.
 static TABLE: LazyLock<Box<[f32; QUANTILES]>> = LazyLock::new(|| {
@@ -109,7 +109,7 @@ mod tests {
         assert!(TABLE.is_sorted());
         assert!(TABLE.iter().zip(TABLE.iter().rev()).all(|(a, b)| *a == -b));
         assert!((moment(2) - 1.0).abs() < 1e-7, "{}", moment(2));
-        assert!((moment(4) - 2.98).abs() < 0.005, "{}", moment(4));
+        assert!((moment(4) - 2.991).abs() < 0.001, "{}", moment(4));
         assert!(TABLE[QUANTILES - 1] < 3.7 && TABLE[QUANTILES - 1] > 3.66, "{}", TABLE[QUANTILES - 1]);
         // The known quantile of 0.975, 3,993.6 of 4,096, lies between the values 3,992 and 3,994.
         assert!(TABLE[3_992] < 1.96 && TABLE[3_994] > 1.96, "{} {}", TABLE[3_992], TABLE[3_994]);
