@@ -70,9 +70,10 @@ fn sheet() -> Result<Vec<u8>, ImageError> {
         }
     }
     for effect in EFFECTS {
-        let end = effect.parameters.iter().try_fold(Ranges::none(), |ranges, p| {
-            ranges.with(effect.name, p.name, [p.plausible[1]; 2])
-        })?;
+        let end = effect
+            .parameters
+            .iter()
+            .try_fold(Ranges::none(), |ranges, p| ranges.with(effect.name, p.name, [p.plausible[1]; 2]))?;
         pictures.push(picture(&end, 0)?);
     }
     let rows = pictures.len().div_ceil(COLUMNS);

@@ -1,10 +1,11 @@
 //! Randomized images from outside: the registry's promises, repeatability, floats beside bytes, and images of any shape.
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 use proptest::prelude::*;
 use trueup::sim2real::Seed;
 use trueup::sim2real::randomize::image::{
-    Border, EFFECTS, Fill, ImageError, ImageIndex, ImageMut, ImageRandomizer, ImageView, Per, Ranges, Settings, Shape, Value,
-    Workspace,
+    Border, EFFECTS, Fill, ImageError, ImageIndex, ImageMut, ImageRandomizer, ImageView, Per, Ranges, Settings, Shape,
+    Value, Workspace,
 };
 
 fn bytes(count: usize, seed: u64) -> Vec<u8> {
@@ -117,7 +118,9 @@ fn the_same_seed_and_index_give_the_same_bits() {
 fn golden_image() {
     let shape = Shape::new(5, 7, 3).unwrap();
     let ranges = Ranges::plausible().filled_with(Fill::Noise).unwrap().with("occlusion", "count", [1.0, 1.0]).unwrap();
-    insta::assert_debug_snapshot!(randomized(&ranges, &bytes(shape.values(), 1), shape, &frames(1)).chunks(21).collect::<Vec<_>>());
+    insta::assert_debug_snapshot!(
+        randomized(&ranges, &bytes(shape.values(), 1), shape, &frames(1)).chunks(21).collect::<Vec<_>>()
+    );
 }
 
 #[test]
@@ -146,8 +149,7 @@ fn effects_are_drawn_by_themselves() {
 #[test]
 fn draws_fill_their_ranges_evenly() {
     let randomizer = ImageRandomizer::new(Ranges::plausible(), Seed(1));
-    let settings: Vec<Settings> =
-        (0..9_000).map(|episode| randomizer.settings(ImageIndex { episode, frame: 0 })).collect();
+    let settings: Vec<Settings> = (0..9_000).map(|episode| randomizer.settings(ImageIndex { episode, frame: 0 })).collect();
     for shift in -4..=4 {
         let count = settings.iter().filter(|s| s.shift.x == shift as f32).count();
         assert!((count as f64 - 1_000.0).abs() < 4.5 * 30.0, "{shift}: {count}");
@@ -201,7 +203,10 @@ fn what_cannot_be_is_told_with_a_hint() {
     let errors: [(ImageError, &[&str]); 12] = [
         (indices, &["2 image(s) and 1 indices"]),
         (shapes, &["4 image(s) of 2 x 1 x 3", "2 of 2 x 2 x 3"]),
-        (plausible().with("brigtness", "offset", [0.0, 0.1]).unwrap_err(), &["\"brigtness\"", "did you mean \"brightness\"?"]),
+        (
+            plausible().with("brigtness", "offset", [0.0, 0.1]).unwrap_err(),
+            &["\"brigtness\"", "did you mean \"brightness\"?"],
+        ),
         (plausible().drawn("bright", Per::Image).unwrap_err(), &["\"bright\""]),
         (plausible().with("noise", "reed", [0.0, 0.1]).unwrap_err(), &["noise has no parameter \"reed\"", "read, shot"]),
         (plausible().with("noise", "read", [0.2, 0.1]).unwrap_err(), &["noise.read from 0.2 to 0.1"]),

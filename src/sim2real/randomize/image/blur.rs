@@ -85,8 +85,8 @@ fn across(scene: &mut Scene, above: &mut [Pixel], own: Pixel, beside: Pixel) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::settings::tests::applied;
     use super::super::Settings;
+    use super::super::settings::tests::applied;
     use super::*;
 
     fn blurred(std: f32) -> Settings {

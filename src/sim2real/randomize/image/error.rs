@@ -20,13 +20,17 @@ pub enum ImageError {
         found: usize,
     },
     /// A number of channels that is no picture.
-    #[error("{0} channels\nhint: 1 (grey), 3 (RGB) or 4 (RGB and alpha); give the frames of a stack one by one, with one index")]
+    #[error(
+        "{0} channels\nhint: 1 (grey), 3 (RGB) or 4 (RGB and alpha); give the frames of a stack one by one, with one index"
+    )]
     Channels(usize),
     /// A side that cannot be.
     #[error("an image of {0}\nhint: height and width are from 1 to {max}", max = Shape::LONGEST_SIDE)]
     Side(Shape),
     /// Two buffers of which one is to become the other differ.
-    #[error("{source_images} image(s) of {source_shape} cannot be written into {target_images} of {target_shape}\nhint: give a target of the same shape")]
+    #[error(
+        "{source_images} image(s) of {source_shape} cannot be written into {target_images} of {target_shape}\nhint: give a target of the same shape"
+    )]
     Shapes {
         /// What is read.
         source_shape: Shape,

@@ -110,7 +110,12 @@ impl Setting for Lens {
         EFFECT.check(&[self.k1, self.k2, self.p1, self.p2])?;
         if !(FOCAL_LENGTHS[0]..=FOCAL_LENGTHS[1]).contains(&f64::from(self.focal_length)) {
             let found = f64::from(self.focal_length);
-            return Err(ImageError::Setting { effect: EFFECT.name, parameter: "focal_length", found, bounds: FOCAL_LENGTHS });
+            return Err(ImageError::Setting {
+                effect: EFFECT.name,
+                parameter: "focal_length",
+                found,
+                bounds: FOCAL_LENGTHS,
+            });
         }
         Ok(())
     }

@@ -119,7 +119,8 @@ mod tests {
         let mut found = noise_of(Noise { read: 0.05, shot: 0.0 }, 0.5, 5);
         found.sort_by(f64::total_cmp);
         let below = |x: f64| 0.5 * statrs::function::erf::erfc(-x / std::f64::consts::SQRT_2);
-        let distance = found.iter().enumerate().map(|(at, n)| (below(n / 0.05) - at as f64 / COUNT).abs()).fold(0.0, f64::max);
+        let distance =
+            found.iter().enumerate().map(|(at, n)| (below(n / 0.05) - at as f64 / COUNT).abs()).fold(0.0, f64::max);
         assert!(distance < 1.95 / COUNT.sqrt() + 0.5 / 4_096.0, "{distance}");
     }
 

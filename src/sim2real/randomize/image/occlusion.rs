@@ -99,7 +99,11 @@ impl Setting for Occlusion {
         let within = |parameter, value: f32| {
             let found = f64::from(value);
             let fine = (0.0..=1.0).contains(&found);
-            if fine { Ok(()) } else { Err(ImageError::Setting { effect: EFFECT.name, parameter, found, bounds: [0.0, 1.0] }) }
+            if fine {
+                Ok(())
+            } else {
+                Err(ImageError::Setting { effect: EFFECT.name, parameter, found, bounds: [0.0, 1.0] })
+            }
         };
         for rectangle in &self.rectangles {
             within("left", rectangle.left)?;

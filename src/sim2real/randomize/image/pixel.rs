@@ -28,48 +28,47 @@ const TOGETHER: usize = 4;
 /// Reads a row of `C` channels. Numbers beyond the channels may be those of the next pixel: nothing looks at them.
 #[inline]
 pub(super) fn load<V: Value, const C: usize>(row: &[V], line: &mut [Pixel]) {
-    for (block, places) in line.chunks_mut(TOGETHER).enumerate() {
-        let values = &row[block * TOGETHER * C..];
-        match (values.get(..(TOGETHER - 1) * C + 4), places.as_chunks_mut::<TOGETHER>()) {
+    let (blocks, rest) = line.as_chunks_mut::<TOGETHER>();
+    let last = blocks.len() * TOGETHER * C;
+    for (values, places) in row.chunks_exact(TOGETHER * C).zip(blocks) {
+        for (k, place) in places.iter_mut().enumerate() {
             // Four values at once are one instruction.
-            (Some(values), ([places], _)) => {
-                for (k, place) in places.iter_mut().enumerate() {
-                    let start = k * C;
-                    *place = pixel([start, start + 1, start + 2, start + 3].map(|at| values[at].number()));
-                }
-            }
-            // The last pixels of a row have fewer.
-            _ => {
-                for (values, place) in values.as_chunks::<C>().0.iter().zip(places) {
-                    let mut numbers = [0.0; 4];
-                    numbers.iter_mut().zip(values).for_each(|(number, value)| *number = value.number());
-                    *place = pixel(numbers);
-                }
-            }
+            *place = match values[k * C..].first_chunk::<4>() {
+                Some([a, b, c, d]) => pixel([a.number(), b.number(), c.number(), d.number()]),
+                None => one::<V, C>(&values[k * C..]),
+            };
         }
     }
+    for (values, place) in row[last..].as_chunks::<C>().0.iter().zip(rest) {
+        *place = one::<V, C>(values);
+    }
+}
+
+/// A pixel of no more than its own values.
+#[inline]
+fn one<V: Value, const C: usize>(values: &[V]) -> Pixel {
+    let mut numbers = [0.0; 4];
+    numbers.iter_mut().zip(values).take(C).for_each(|(number, value)| *number = value.number());
+    pixel(numbers)
 }
 
 /// Writes a row of `C` channels, cut off and rounded as the values need it.
 #[inline]
 pub(super) fn store<V: Value, const C: usize>(line: &[Pixel], row: &mut [V]) {
-    for (block, pixels) in line.chunks(TOGETHER).enumerate() {
-        let mut four = [Pixel::ZERO; TOGETHER];
-        four[..pixels.len()].copy_from_slice(pixels);
-        let nearest = V::nearest(&four);
-        let values = &mut row[block * TOGETHER * C..];
-        match values.get_mut(..(TOGETHER - 1) * C + 4) {
-            Some(values) if pixels.len() == TOGETHER => {
-                for (k, nearest) in nearest.iter().enumerate() {
-                    // What is written beyond the pixel's own values is written over with the next one.
-                    values[k * C..k * C + 4].copy_from_slice(nearest);
-                }
-            }
-            _ => {
-                for (values, nearest) in values.as_chunks_mut::<C>().0.iter_mut().zip(&nearest[..pixels.len()]) {
-                    values.copy_from_slice(&nearest[..C]);
-                }
+    let (blocks, rest) = line.as_chunks::<TOGETHER>();
+    let (values, last) = row.split_at_mut(blocks.len() * TOGETHER * C);
+    for (values, pixels) in values.chunks_exact_mut(TOGETHER * C).zip(blocks) {
+        for (k, nearest) in V::nearest(pixels).into_iter().enumerate() {
+            let own = &mut values[k * C..];
+            // What is written beyond the pixel's own values is written over with the next one.
+            match own.first_chunk_mut::<4>() {
+                Some(four) => *four = nearest,
+                None => own.copy_from_slice(&nearest[..own.len()]),
             }
         }
+    }
+    for (values, pixel) in last.as_chunks_mut::<C>().0.iter_mut().zip(rest) {
+        let [nearest, ..] = V::nearest(&[*pixel; TOGETHER]);
+        values.copy_from_slice(&nearest[..C]);
     }
 }

@@ -128,17 +128,15 @@ impl ImageRandomizer {
         let threads = rayon::current_num_threads().min(images).max(1);
         let each = images.div_ceil(threads).max(1);
         let size = shape.values();
-        let part = |(((at, targets), indices), scratch): (((usize, &mut [V]), &[ImageIndex]), &mut Scratch)| {
+        let parts = target.values.par_chunks_mut(each * size).enumerate().zip(indices.par_chunks(each));
+        parts.zip(workspace.of(threads)).for_each(|(((part, targets), indices), scratch)| {
             let mut streams = self.streams.clone();
-            for ((k, target), index) in targets.chunks_exact_mut(size).enumerate().zip(indices) {
-                let image = at * each + k;
+            for ((image, target), index) in (part * each..).zip(targets.chunks_exact_mut(size)).zip(indices) {
                 let settings = self.ranges.draw(&mut streams, *index);
-                scratch.render(&settings, source.map(|values| &values[image * size..(image + 1) * size]), target, shape);
+                let source = source.map(|values| &values[image * size..(image + 1) * size]);
+                scratch.render(&settings, source, target, shape);
             }
-        };
-        let scratch = workspace.of(threads);
-        let parts = target.values.par_chunks_mut(each * size).enumerate().zip(indices.par_chunks(each)).zip(scratch);
-        parts.for_each(part);
+        });
         Ok(())
     }
 }

@@ -146,11 +146,17 @@ pub(super) mod tests {
             (Settings { exposure: Exposure { stops: 11.0 }, ..none }, "exposure.stops is 11"),
             (Settings { white_balance: WhiteBalance { red: 0.0, blue: -11.0 }, ..none }, "white_balance.blue is -11"),
             (Settings { contrast: Contrast { gain: -1.0 }, ..none }, "contrast.gain is -1"),
-            (Settings { hue_saturation: HueSaturation { hue: 400.0, saturation: 1.0 }, ..none }, "hue_saturation.hue is 400"),
+            (
+                Settings { hue_saturation: HueSaturation { hue: 400.0, saturation: 1.0 }, ..none },
+                "hue_saturation.hue is 400",
+            ),
             (Settings { brightness: Brightness { offset: 2.0 }, ..none }, "brightness.offset is 2"),
             (Settings { noise: Noise { read: 0.0, shot: -0.5 }, ..none }, "noise.shot is -0.5"),
             (Settings { border: Border::Constant(3.0), ..none }, "lens.border is 3"),
-            (Settings { occlusion: Occlusion { fill: Fill::Constant(-1.0), ..none.occlusion }, ..none }, "occlusion.fill is -1"),
+            (
+                Settings { occlusion: Occlusion { fill: Fill::Constant(-1.0), ..none.occlusion }, ..none },
+                "occlusion.fill is -1",
+            ),
         ];
         let rectangles = [Rectangle { left: 0.0, top: 0.0, width: 1.5, height: 0.5 }; Occlusion::MOST];
         let wide = (Settings { occlusion: Occlusion { rectangles, ..none.occlusion }, ..none }, "occlusion.width is 1.5");

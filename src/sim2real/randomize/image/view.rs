@@ -86,12 +86,14 @@ pub(super) mod sealed {
         #[inline]
         fn nearest(pixels: &[Pixel; 4]) -> [[Self; 4]; 4] {
             // Numbers that are too large for a narrower integer become its largest.
-            let [a, b, c, d] = pixels.map(|pixel| pixel.fast_round_int().to_array());
-            let pair = |a: [i32; 4], b: [i32; 4]| {
-                i16x8::from_i32x8_saturate(i32x8::new([a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]))
+            let pair = |a: Pixel, b: Pixel| {
+                let ([a, b, c, d], [e, f, g, h]) = (a.fast_round_int().to_array(), b.fast_round_int().to_array());
+                i16x8::from_i32x8_saturate(i32x8::new([a, b, c, d, e, f, g, h]))
             };
-            let bytes = u8x16::narrow_i16x8(pair(a, b), pair(c, d)).to_array();
-            [0, 4, 8, 12].map(|at| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+            let bytes = u8x16::narrow_i16x8(pair(pixels[0], pixels[1]), pair(pixels[2], pixels[3])).to_array();
+            let mut four = [[0; 4]; 4];
+            four.as_flattened_mut().copy_from_slice(&bytes);
+            four
         }
 
         fn wrong(_values: &[Self]) -> Option<(usize, f32)> {
@@ -109,7 +111,8 @@ pub(super) mod sealed {
 
         #[inline]
         fn nearest(pixels: &[Pixel; 4]) -> [[Self; 4]; 4] {
-            pixels.map(|pixel| pixel.fast_max(Pixel::ZERO).fast_min(Pixel::ONE).to_array())
+            let cut = |pixel: Pixel| pixel.fast_max(Pixel::ZERO).fast_min(Pixel::ONE).to_array();
+            [cut(pixels[0]), cut(pixels[1]), cut(pixels[2]), cut(pixels[3])]
         }
 
         fn wrong(values: &[Self]) -> Option<(usize, f32)> {
@@ -235,7 +238,10 @@ mod tests {
         let error = ImageView::new(&[0_u8; 17], shape).unwrap_err();
         assert_eq!(error, ImageError::Length { shape, images: 1, expected: 18, found: 17 });
         let text = error.to_string();
-        assert!(text.contains("2 x 3 x 3") && text.contains("18") && text.contains("17") && text.contains("hint:"), "{text}");
+        assert!(
+            text.contains("2 x 3 x 3") && text.contains("18") && text.contains("17") && text.contains("hint:"),
+            "{text}"
+        );
         assert!(ImageMut::batch(&mut [0_u8; 36], 2, shape).is_ok());
         assert!(ImageMut::batch(&mut [0_u8; 36], usize::MAX, shape).is_err());
         // A shape written by hand is checked, too.
