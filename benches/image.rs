@@ -57,9 +57,10 @@ fn references(criterion: &mut Criterion, source: &[u8]) {
     let mut target = source.to_vec();
     group.bench_function("reference_copy", |b| b.iter(|| target.copy_from_slice(black_box(source))));
     group.bench_function("reference_add", |b| {
+        let offset = black_box(12.5);
         b.iter(|| {
             for (target, value) in target.iter_mut().zip(black_box(source)) {
-                *target = (f32::from(*value) + black_box(12.5)).clamp(0.0, 255.0) as u8;
+                *target = (f32::from(*value) + offset).clamp(0.0, 255.0) as u8;
             }
         });
     });
@@ -67,6 +68,7 @@ fn references(criterion: &mut Criterion, source: &[u8]) {
 }
 
 fn images(criterion: &mut Criterion) {
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("one thread");
     let source = bytes();
     references(criterion, &source);
     for effect in EFFECTS {
@@ -76,20 +78,13 @@ fn images(criterion: &mut Criterion) {
     measure(criterion, "all", &source, all.clone(), &indices(false));
     measure(criterion, "all_of_new_episodes", &source, all.clone(), &indices(true));
     let held = all.clone().drawn("shift", Per::Episode).expect("an effect");
-    measure(criterion, "all_lens_and_shift_held", &source, held, &indices(false));
+    measure(criterion, "all_lens_and_shift_held", &source, held.clone(), &indices(false));
+    let core = held.clone().without("blur").and_then(|ranges| ranges.without("shift")).expect("effects");
+    measure(criterion, "all_but_blur_and_shift", &source, core, &indices(false));
     measure(criterion, "plausible", &source, Ranges::plausible(), &indices(false));
     let floats: Vec<f32> = source.iter().map(|byte| f32::from(*byte) / 255.0).collect();
     measure(criterion, "all_float", &floats, all, &indices(false));
 }
 
-fn on_one_thread(criterion: &mut Criterion) {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    pool.install(|| {
-        let mut own = Criterion::default().configure_from_args();
-        images(&mut own);
-    });
-    let _ = criterion;
-}
-
-criterion_group!(benches, on_one_thread);
+criterion_group!(benches, images);
 criterion_main!(benches);

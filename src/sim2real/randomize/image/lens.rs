@@ -90,10 +90,9 @@ impl Lens {
     #[inline]
     pub(super) fn displacement(&self, x: f32, y: f32) -> (f32, f32) {
         let square = x * x + y * y;
-        let radial = square * (self.k1 + square * self.k2);
-        let across = 2.0 * self.p1 * x * y + self.p2 * (square + 2.0 * x * x);
-        let along = self.p1 * (square + 2.0 * y * y) + 2.0 * self.p2 * x * y;
-        (x * radial + across, y * radial + along)
+        // Both tangential terms have 2 (p1 y + p2 x) times the coordinate.
+        let along_ray = square * (self.k1 + square * self.k2) + 2.0 * (self.p1 * y + self.p2 * x);
+        (x * along_ray + self.p2 * square, y * along_ray + self.p1 * square)
     }
 }
 

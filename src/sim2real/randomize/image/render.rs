@@ -54,7 +54,7 @@ impl Scratch {
                 } else {
                     load::<V, C>(&source.unwrap_or(target)[row.clone()], line);
                 }
-                shade(line, colour, noise, (y * shape.width) as u64);
+                shade(line, colour.as_ref(), noise.as_ref(), (y * shape.width) as u64);
                 store::<V, C>(line, &mut target[row]);
             }
         } else if let Some(source) = source {
@@ -80,13 +80,12 @@ impl Scratch {
 }
 
 /// What becomes of the pixels of a row where they are, of which the first has the number `first`.
-fn shade(line: &mut [Pixel], colour: Option<Colour>, noise: Option<Noisy>, first: u64) {
-    match (colour, noise) {
-        (None, None) => {}
-        (Some(colour), None) => line.iter_mut().for_each(|pixel| *pixel = colour.apply(*pixel)),
-        (None, Some(noise)) => line.iter_mut().zip(first..).for_each(|(pixel, at)| *pixel = noise.apply(*pixel, at)),
-        (Some(colour), Some(noise)) => {
-            line.iter_mut().zip(first..).for_each(|(pixel, at)| *pixel = noise.apply(colour.apply(*pixel), at));
-        }
+fn shade(line: &mut [Pixel], colour: Option<&Colour>, noise: Option<&Noisy>, first: u64) {
+    // One after the other: a pixel's way through both at once is too long for a processor to work on many pixels.
+    if let Some(colour) = colour {
+        line.iter_mut().for_each(|pixel| *pixel = colour.apply(*pixel));
+    }
+    if let Some(noise) = noise {
+        line.iter_mut().zip(first..).for_each(|(pixel, at)| *pixel = noise.apply(*pixel, at));
     }
 }
