@@ -9,7 +9,7 @@ use super::settings::Settings;
 use super::view::{ImageMut, ImageView, Value, check_values};
 use crate::sim2real::Seed;
 
-/// Room for images under way; once it has grown to what images need, nothing is allocated any more.
+/// Room for images under way, a piece a thread; once it has grown to the size of the images, none is allocated any more.
 #[derive(Debug, Default)]
 pub struct Workspace {
     scratch: Vec<Scratch>,
