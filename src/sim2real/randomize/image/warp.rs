@@ -54,7 +54,9 @@ impl Warp {
         let places = self.first[row.clone()].iter().zip(&self.right[row.clone()]).zip(&self.down[row]);
         for (pixel, ((first, right), down)) in line.iter_mut().zip(places) {
             let first = *first as usize;
-            let (above, below) = (&pixels[first..first + 2], &pixels[first + stride..first + stride + 2]);
+            // One check of bounds instead of two.
+            let block = &pixels[first..first + stride + 2];
+            let (above, below) = ([block[0], block[1]], [block[stride], block[stride + 1]]);
             let (right, down) = (Pixel::splat(*right), Pixel::splat(*down));
             *pixel = between(between(above[0], above[1], right), between(below[0], below[1], right), down);
         }
