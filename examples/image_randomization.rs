@@ -5,6 +5,8 @@
 //! cargo run --release --example image_randomization -- out/images.ppm
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "what it prints is what it is for")]
+
 use std::process::ExitCode;
 
 use trueup::sim2real::Seed;
@@ -43,7 +45,7 @@ fn scene(x: usize, y: usize) -> [u8; 3] {
     } else if within([0.7, 0.55, 0.12]) {
         [60, 110, 190]
     } else if y > 0.6 {
-        let even = ((x * 8.0) as usize + (y * 8.0) as usize) % 2 == 0;
+        let even = ((x * 8.0) as usize + (y * 8.0) as usize).is_multiple_of(2);
         if even { [225, 220, 205] } else { [50, 60, 55] }
     } else {
         let light = 110.0 + 120.0 * (0.6 - y) / 0.6;
