@@ -15,6 +15,7 @@ pub mod mechanism;
 mod parameter;
 mod plant;
 mod recording;
+pub mod regime;
 mod residual;
 mod run;
 mod seed;
