@@ -1,96 +1,12 @@
 //! Bayesian online change points: how long it has been since the last change, as probabilities.
 
 use serde::{Deserialize, Serialize};
-use statrs::function::gamma::ln_gamma;
 
-use super::RegimeError;
-
-/// From this shape on, a difference of log-gammas is taken from its asymptotic series, which there is exact to 1e-16.
-const ASYMPTOTIC: f64 = 256.0;
+use super::runs::{Runs, peak};
+use super::{Hazard, Prior, RegimeError};
 
 /// Numbers of rows up to which constants of the law are kept.
 const KEPT_PEAKS: u32 = 2_048;
-
-/// What is known of a stretch between two changes before anything of it is seen. Units are those of the series.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Prior {
-    /// Gaussian of unknown mean and variance: the variance is inverse-gamma of `shape` and `scale`, the mean Gaussian around
-    /// `mean` with the variance over `strength`.
-    NormalInverseGamma {
-        /// Expected mean.
-        mean: f64,
-        /// Number of observations that the expected mean is worth, above 0.
-        strength: f64,
-        /// Half the number of observations that the expected variance is worth, above 0.
-        shape: f64,
-        /// Shape times the expected variance, roughly, above 0.
-        scale: f64,
-    },
-    /// Gaussian of unknown mean and known variance.
-    KnownVariance {
-        /// Expected mean.
-        mean: f64,
-        /// Variance of means around it, above 0.
-        spread: f64,
-        /// Variance of observations around their mean, above 0.
-        variance: f64,
-    },
-}
-
-impl Prior {
-    /// A weak prior of mean and variance: worth a twentieth of an observation for the mean, and two for the variance.
-    #[must_use]
-    pub fn weak(mean: f64, deviation: f64) -> Self {
-        Self::NormalInverseGamma { mean, strength: 0.05, shape: 1.0, scale: deviation * deviation }
-    }
-
-    fn check(self) -> Result<(), RegimeError> {
-        let (mean, positive) = match self {
-            Self::NormalInverseGamma { mean, strength, shape, scale } => {
-                (mean, [("strength", strength), ("shape", shape), ("scale", scale)])
-            }
-            Self::KnownVariance { mean, spread, variance } => {
-                (mean, [("spread", spread), ("variance", variance), ("variance", variance)])
-            }
-        };
-        RegimeError::setting("mean", mean, mean.is_finite(), "any finite number")?;
-        positive.into_iter().try_for_each(|(name, value)| {
-            RegimeError::setting(name, value, value.is_finite() && value > 0.0, "above 0 and finite")
-        })
-    }
-}
-
-/// The probability that a change comes before the next row.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Hazard {
-    /// The same at any time, between 0 and 1: changes come every 1 / hazard rows on average.
-    Constant(f64),
-    /// After runs of 1, 2, 3, … rows, each from 0 to 1 (both excluded); longer runs have the last.
-    ByLength(Vec<f64>),
-}
-
-impl Hazard {
-    fn check(&self) -> Result<(), RegimeError> {
-        let all = match self {
-            Self::Constant(hazard) => std::slice::from_ref(hazard),
-            Self::ByLength(hazards) => hazards,
-        };
-        let hint = "between 0 and 1, such as 0.004 for a change every 250 rows";
-        if all.is_empty() {
-            return RegimeError::setting("number of hazards", 0.0, false, "at least one");
-        }
-        all.iter().try_for_each(|h| RegimeError::setting("hazard", *h, *h > 0.0 && *h < 1.0, hint))
-    }
-
-    fn after(&self, run: u64) -> f64 {
-        match self {
-            Self::Constant(hazard) => *hazard,
-            Self::ByLength(hazards) => hazards[(run.max(1) as usize - 1).min(hazards.len() - 1)],
-        }
-    }
-}
 
 /// What is assumed of changes, and how much is kept of what could be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -132,22 +48,6 @@ pub struct RunLengths {
     /// Logarithm of the density at the mean, but for the scale, by the number of rows seen.
     peaks: Vec<f64>,
     log_likelihood: f64,
-}
-
-/// Runs that may be, the longest first: arrays over them.
-#[derive(Debug, Clone, Default, PartialEq)]
-struct Runs {
-    /// Row at which each began, from 0.
-    starts: Vec<u64>,
-    /// Rows of it that were observed.
-    seen: Vec<f64>,
-    mean: Vec<f64>,
-    /// Scale of the inverse gamma, and its logarithm.
-    scale: Vec<f64>,
-    log_scale: Vec<f64>,
-    probability: Vec<f64>,
-    /// Logarithm of the density of the likeliest changes that lead here.
-    best: Vec<f64>,
 }
 
 impl RunLengths {
@@ -343,72 +243,6 @@ impl RunLengths {
     }
 }
 
-impl Runs {
-    /// Logarithm of the density of `value` under Student's t, as which an unknown variance foretells it; the run learns of it.
-    #[inline]
-    fn learn(&mut self, run: usize, value: f64, strength: f64, shape: f64, peaks: &[f64]) -> f64 {
-        let (known, shape) = (strength + self.seen[run], shape + 0.5 * self.seen[run]);
-        let deviation = value - self.mean[run];
-        let scale = self.scale[run] + 0.5 * known / (known + 1.0) * deviation * deviation;
-        let log_scale = scale.ln();
-        let peak = peaks.get(self.seen[run] as usize).copied().unwrap_or_else(|| peak(known, shape));
-        let foretold = peak + shape * self.log_scale[run] - (shape + 0.5) * log_scale;
-        self.mean[run] += deviation / (known + 1.0);
-        self.scale[run] = scale;
-        self.log_scale[run] = log_scale;
-        self.seen[run] += 1.0;
-        foretold
-    }
-
-    /// The same of a known variance: a Gaussian, wider by what is not known of its mean.
-    #[inline]
-    fn learn_mean(&mut self, run: usize, value: f64, spread: f64, variance: f64) -> f64 {
-        let unknown = 1.0 / (1.0 / spread + self.seen[run] / variance);
-        let total = unknown + variance;
-        let deviation = value - self.mean[run];
-        self.mean[run] += deviation * unknown / total;
-        self.seen[run] += 1.0;
-        -0.5 * ((std::f64::consts::TAU * total).ln() + deviation * deviation / total)
-    }
-
-    fn shift(&mut self, from: usize, to: usize) {
-        if from == to {
-            return;
-        }
-        self.starts[to] = self.starts[from];
-        for column in self.columns() {
-            column[to] = column[from];
-        }
-    }
-
-    fn truncate(&mut self, kept: usize) {
-        self.starts.truncate(kept);
-        for column in self.columns() {
-            column.truncate(kept);
-        }
-    }
-
-    fn columns(&mut self) -> [&mut Vec<f64>; 6] {
-        let Self { seen, mean, scale, log_scale, probability, best, .. } = self;
-        [seen, mean, scale, log_scale, probability, best]
-    }
-}
-
-/// Logarithm of the factor of Student's t that depends on the number of rows alone.
-fn peak(known: f64, shape: f64) -> f64 {
-    gamma_ratio(shape) - 0.5 * (std::f64::consts::TAU * (known + 1.0) / known).ln()
-}
-
-/// Logarithm of gamma(shape + 1/2) / gamma(shape).
-#[inline]
-fn gamma_ratio(shape: f64) -> f64 {
-    if shape < ASYMPTOTIC {
-        return ln_gamma(shape + 0.5) - ln_gamma(shape);
-    }
-    let inverse = 1.0 / shape;
-    0.5 * shape.ln() - inverse / 8.0 + inverse * inverse * inverse / 192.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -529,16 +363,6 @@ mod tests {
         let mut lengths = RunLengths::new(assumed).unwrap();
         series.iter().for_each(|x| assert!(lengths.step(*x).unwrap() > 0));
         assert!((lengths.log_likelihood() - sum.ln()).abs() < 1e-10);
-    }
-
-    #[test]
-    fn the_asymptotic_series_joins_on() {
-        for shape in [256.0, 1_000.0, 1e6] {
-            let exact = ln_gamma(shape + 0.5) - ln_gamma(shape);
-            assert!((gamma_ratio(shape) - exact).abs() < 1e-9 * exact.abs().max(1.0), "{shape}");
-        }
-        // gamma(3/2) / gamma(1) is half the root of pi.
-        assert!((gamma_ratio(1.0) - (0.5 * std::f64::consts::PI.sqrt()).ln()).abs() < 1e-12);
     }
 
     #[test]

@@ -2,10 +2,9 @@
 
 use rand::RngExt;
 
-use super::baum_welch::Settings;
 use super::moments::Moments;
 use super::observations::is_lost;
-use super::{HiddenMarkov, Observations};
+use super::{HiddenMarkov, Observations, Settings};
 use crate::sim2real::Seed;
 
 /// Rows over which level and scale are taken around each row, in turn.
