@@ -8,8 +8,8 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use trueup::sim2real::Seed;
 use trueup::sim2real::regime::{
-    Assumed, Cost, Cusum, CusumSettings, Degrees, Division, DriftWindow, Emission, Family, Filter, HiddenMarkov, Observations,
-    Penalty, Prior, RunLengths, Settings, Spread, fit,
+    Assumed, Cost, Cusum, CusumSettings, Degrees, Division, DriftWindow, Emission, Family, Filter, HiddenMarkov,
+    Observations, Penalty, Prior, RunLengths, Settings, Spread, fit,
 };
 
 const ROWS: usize = 100_000;
@@ -80,7 +80,9 @@ fn whole_series(criterion: &mut Criterion) {
         let settings = Settings { family: Family::StudentT(Degrees::Fitted), ..Settings::new(3) };
         b.iter(|| black_box(fit(&short, &settings).expect("a fit")));
     });
-    group.bench_function("viterbi_1000000_rows", |b| b.iter(|| black_box(model(1, None).viterbi(series[0]).expect("a path"))));
+    group.bench_function("viterbi_1000000_rows", |b| {
+        b.iter(|| black_box(model(1, None).viterbi(series[0]).expect("a path")))
+    });
     for (name, cost) in [("mean", Cost::Mean), ("mean_and_variance", Cost::MeanAndVariance)] {
         let division = Division { cost, penalty: Penalty::Mbic, shortest: 5 };
         group.bench_function(BenchmarkId::new("division_100000_rows", name), |b| {

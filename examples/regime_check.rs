@@ -74,13 +74,21 @@ fn models() -> Result<Vec<Case>, RegimeError> {
         ),
         (
             "two_columns_20000",
-            HiddenMarkov::new(vec![0.5, 0.5], two(), vec![diagonal(&[0.0, 1.0], &[1.0, 0.5]), diagonal(&[1.0, -1.0], &[2.0, 1.0])])?,
+            HiddenMarkov::new(
+                vec![0.5, 0.5],
+                two(),
+                vec![diagonal(&[0.0, 1.0], &[1.0, 0.5]), diagonal(&[1.0, -1.0], &[2.0, 1.0])],
+            )?,
             Family::Gaussian,
             20_000,
         ),
         (
             "covariance_20000",
-            HiddenMarkov::new(vec![0.5, 0.5], two(), vec![full([0.0, 0.0], 1.0, 1.0, 0.8), full([0.5, -0.5], 2.0, 1.5, -1.0)])?,
+            HiddenMarkov::new(
+                vec![0.5, 0.5],
+                two(),
+                vec![full([0.0, 0.0], 1.0, 1.0, 0.8), full([0.5, -0.5], 2.0, 1.5, -1.0)],
+            )?,
             Family::GaussianFull,
             20_000,
         ),

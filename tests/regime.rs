@@ -10,12 +10,13 @@ use trueup::sim2real::regime::{
 /// Annual flow of the Nile at Aswan, 1871 to 1970 [1e8 m³]: G. W. Cobb, *The problem of the Nile*, Biometrika 65 (1978); the data
 /// set `Nile` of R.
 const NILE: [f64; 100] = [
-    1120.0, 1160.0, 963.0, 1210.0, 1160.0, 1160.0, 813.0, 1230.0, 1370.0, 1140.0, 995.0, 935.0, 1110.0, 994.0, 1020.0, 960.0,
-    1180.0, 799.0, 958.0, 1140.0, 1100.0, 1210.0, 1150.0, 1250.0, 1260.0, 1220.0, 1030.0, 1100.0, 774.0, 840.0, 874.0, 694.0,
-    940.0, 833.0, 701.0, 916.0, 692.0, 1020.0, 1050.0, 969.0, 831.0, 726.0, 456.0, 824.0, 702.0, 1120.0, 1100.0, 832.0, 764.0,
-    821.0, 768.0, 845.0, 864.0, 862.0, 698.0, 845.0, 744.0, 796.0, 1040.0, 759.0, 781.0, 865.0, 845.0, 944.0, 984.0, 897.0,
-    822.0, 1010.0, 771.0, 676.0, 649.0, 846.0, 812.0, 742.0, 801.0, 1040.0, 860.0, 874.0, 848.0, 890.0, 744.0, 749.0, 838.0,
-    1050.0, 918.0, 986.0, 797.0, 923.0, 975.0, 815.0, 1020.0, 906.0, 901.0, 1170.0, 912.0, 746.0, 919.0, 718.0, 714.0, 740.0,
+    1120.0, 1160.0, 963.0, 1210.0, 1160.0, 1160.0, 813.0, 1230.0, 1370.0, 1140.0, 995.0, 935.0, 1110.0, 994.0, 1020.0,
+    960.0, 1180.0, 799.0, 958.0, 1140.0, 1100.0, 1210.0, 1150.0, 1250.0, 1260.0, 1220.0, 1030.0, 1100.0, 774.0, 840.0,
+    874.0, 694.0, 940.0, 833.0, 701.0, 916.0, 692.0, 1020.0, 1050.0, 969.0, 831.0, 726.0, 456.0, 824.0, 702.0, 1120.0,
+    1100.0, 832.0, 764.0, 821.0, 768.0, 845.0, 864.0, 862.0, 698.0, 845.0, 744.0, 796.0, 1040.0, 759.0, 781.0, 865.0, 845.0,
+    944.0, 984.0, 897.0, 822.0, 1010.0, 771.0, 676.0, 649.0, 846.0, 812.0, 742.0, 801.0, 1040.0, 860.0, 874.0, 848.0, 890.0,
+    744.0, 749.0, 838.0, 1050.0, 918.0, 986.0, 797.0, 923.0, 975.0, 815.0, 1020.0, 906.0, 901.0, 1170.0, 912.0, 746.0,
+    919.0, 718.0, 714.0, 740.0,
 ];
 
 /// The row of 1899, the first year of the lower flow.
@@ -36,12 +37,9 @@ fn market() -> HiddenMarkov {
 /// worked out with a = exp(-1/2) on paper.
 #[test]
 fn a_chain_of_two_rows_by_hand() {
-    let model = HiddenMarkov::new(
-        vec![0.8, 0.2],
-        vec![vec![0.9, 0.1], vec![0.4, 0.6]],
-        vec![state(0.0, 1.0), state(1.0, 1.0)],
-    )
-    .unwrap();
+    let model =
+        HiddenMarkov::new(vec![0.8, 0.2], vec![vec![0.9, 0.1], vec![0.4, 0.6]], vec![state(0.0, 1.0), state(1.0, 1.0)])
+            .unwrap();
     let (near, far) = (1.0 / std::f64::consts::TAU.sqrt(), (-0.5_f64).exp() / std::f64::consts::TAU.sqrt());
     // Rows 0 and 1: the four paths, one after the other.
     let paths = [
@@ -124,7 +122,9 @@ fn a_fit_finds_what_a_series_was_drawn_from() {
 fn a_likelihood_never_falls_with_iterations() {
     let drawn = market().simulate(2_000, Seed(3));
     let series = [Observations::of(&drawn.values).unwrap()];
-    for family in [Family::Gaussian, Family::StudentT(Degrees::Fitted), Family::StudentT(Degrees::Fixed(4.0)), Family::GaussianFull] {
+    for family in
+        [Family::Gaussian, Family::StudentT(Degrees::Fitted), Family::StudentT(Degrees::Fixed(4.0)), Family::GaussianFull]
+    {
         let mut before = f64::NEG_INFINITY;
         for iterations in [1, 2, 3, 5, 8, 13, 30, 80] {
             let settings = Settings { iterations, family, starts: 1, tolerance: 0.0, ..Settings::new(3) };

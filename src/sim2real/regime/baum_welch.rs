@@ -3,10 +3,11 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::emission::Densities;
 use super::moments::Moments;
 use super::observations::is_lost;
 use super::starts;
-use super::trellis::Trellis;
+use super::trellis::{Trellis, Visit};
 use super::{Degrees, Emission, Family, HiddenMarkov, Observations, RegimeError, Settings, Spread};
 
 /// Rows of which starts are tried: of a longer series a sample of stretches, and the best start goes on over all of it.
@@ -87,9 +88,8 @@ pub fn fit(series: &[Observations], settings: &Settings) -> Result<Fit, RegimeEr
         .collect();
     let starts = tried.iter().map(|climb| climb.as_ref().map(|c| c.log_likelihood)).collect();
     // The first of the best.
-    let best = tried.into_iter().flatten().reduce(|best, next| {
-        if next.log_likelihood > best.log_likelihood { next } else { best }
-    });
+    let best =
+        tried.into_iter().flatten().reduce(|best, next| if next.log_likelihood > best.log_likelihood { next } else { best });
     let Some(best) = best else {
         return Err(RegimeError::FewValues { states: settings.states, distinct: whole.distinct });
     };
@@ -128,9 +128,8 @@ fn narrow(emission: &Emission, floors: &[f64]) -> bool {
     match &emission.spread {
         Spread::Diagonal(variances) => variances.iter().zip(floors).any(|(v, f)| at(*v, *f)),
         Spread::Full(rows) => {
-            let scaled = nalgebra::DMatrix::from_fn(floors.len(), floors.len(), |i, j| {
-                rows[i][j] / (floors[i] * floors[j]).sqrt()
-            });
+            let scaled =
+                nalgebra::DMatrix::from_fn(floors.len(), floors.len(), |i, j| rows[i][j] / (floors[i] * floors[j]).sqrt());
             // Of eigenvalues whose ratio reaches 1e6, digits are lost.
             scaled.symmetric_eigenvalues().min() <= 1.0 + 1e-6
         }
@@ -159,7 +158,8 @@ impl Whole {
         }
         let mean = |column: usize| rows().map(|row| row[column]).sum::<f64>() / observed as f64;
         let means: Vec<f64> = (0..width).map(mean).collect();
-        let variance = |column: usize| rows().map(|row| (row[column] - means[column]).powi(2)).sum::<f64>() / observed as f64;
+        let variance =
+            |column: usize| rows().map(|row| (row[column] - means[column]).powi(2)).sum::<f64>() / observed as f64;
         let variances: Vec<f64> = (0..width).map(variance).collect();
         let mut different: Vec<&[f64]> = vec![];
         for row in rows() {
@@ -239,6 +239,35 @@ struct Expected {
     moments: Moments,
 }
 
+/// Adds up what is expected of one series.
+struct Counting<'a> {
+    expected: &'a mut Expected,
+    part: Observations<'a>,
+    densities: &'a Densities,
+    beliefs: &'a [f64],
+}
+
+impl Visit for Counting<'_> {
+    #[inline(always)]
+    fn visit(&mut self, number: usize, posterior: &[f64], ahead: &[f64]) {
+        let states = posterior.len();
+        let row = self.part.row(number);
+        if !is_lost(row) {
+            self.expected.moments.add(row, posterior, Some(self.densities));
+        }
+        if number == 0 {
+            self.expected.initial.iter_mut().zip(posterior).for_each(|(sum, p)| *sum += p);
+            return;
+        }
+        let belief = &self.beliefs[(number - 1) * states..][..states];
+        for (sums, from) in self.expected.transition.chunks_exact_mut(states).zip(belief) {
+            for (sum, to) in sums.iter_mut().zip(ahead) {
+                *sum += from * to;
+            }
+        }
+    }
+}
+
 impl Expected {
     fn of(model: &HiddenMarkov, series: &[Observations], family: Family, trellis: &mut Trellis) -> Self {
         let states = model.states();
@@ -252,22 +281,8 @@ impl Expected {
         for part in series.iter().filter(|part| !part.is_empty()) {
             trellis.forward(model, *part);
             expected.log_likelihood += trellis.log_likelihood;
-            trellis.backward(model, |number, posterior, ahead| {
-                let row = part.row(number);
-                if !is_lost(row) {
-                    expected.moments.add(row, posterior, Some(model.densities()));
-                }
-                if number == 0 {
-                    expected.initial.iter_mut().zip(posterior).for_each(|(sum, p)| *sum += p);
-                    return;
-                }
-                let belief = &trellis.beliefs[(number - 1) * posterior.len()..][..posterior.len()];
-                for (sums, from) in expected.transition.chunks_exact_mut(posterior.len()).zip(belief) {
-                    for (sum, to) in sums.iter_mut().zip(ahead) {
-                        *sum += from * to;
-                    }
-                }
-            });
+            let (densities, beliefs) = (model.densities(), trellis.beliefs.as_slice());
+            trellis.backward(model, &mut Counting { expected: &mut expected, part: *part, densities, beliefs });
         }
         expected
     }

@@ -200,7 +200,8 @@ mod tests {
         let alarms: Vec<Alarm> = series.filter_map(|x| cusum.step(x).unwrap()).collect();
         assert_eq!(alarms, [Alarm { shift: Shift::Up, row: 22, since: 20 }]);
         let mut cusum = Cusum::new(settings(4.0)).unwrap();
-        let alarms: Vec<Alarm> = [10.0, f64::NAN, 6.0, 6.0, 6.0].into_iter().filter_map(|x| cusum.step(x).unwrap()).collect();
+        let alarms: Vec<Alarm> =
+            [10.0, f64::NAN, 6.0, 6.0, 6.0].into_iter().filter_map(|x| cusum.step(x).unwrap()).collect();
         assert_eq!(alarms, [Alarm { shift: Shift::Down, row: 4, since: 2 }]);
         assert_eq!(cusum.sums(), [0.0, 0.0]);
     }

@@ -1,7 +1,17 @@
 //! Which states a whole series was in: the probability of each in each row, and the likeliest path.
 
-use super::trellis::Trellis;
+use super::trellis::{Trellis, Visit, follow};
 use super::{HiddenMarkov, Observations, RegimeError};
+
+/// Probabilities as they are shown, `[row][state]`.
+struct Smoothed(Vec<f64>);
+
+impl Visit for Smoothed {
+    #[inline(always)]
+    fn visit(&mut self, row: usize, posterior: &[f64], _: &[f64]) {
+        self.0[row * posterior.len()..][..posterior.len()].copy_from_slice(posterior);
+    }
+}
 
 impl HiddenMarkov {
     /// Logarithm of the density of a series.
@@ -10,9 +20,7 @@ impl HiddenMarkov {
     /// A series of another width than the model's.
     pub fn log_likelihood(&self, series: Observations) -> Result<f64, RegimeError> {
         self.check(series)?;
-        let mut trellis = Trellis::default();
-        trellis.forward(self, series);
-        Ok(trellis.log_likelihood)
+        Ok(follow(self, series, |_| ()))
     }
 
     /// Probability of each state in each row given the whole series, `[row][state]` row after row. It looks ahead: decisions
@@ -24,11 +32,9 @@ impl HiddenMarkov {
         self.check(series)?;
         let mut trellis = Trellis::default();
         trellis.forward(self, series);
-        let mut smoothed = vec![0.0; trellis.beliefs.len()];
-        trellis.backward(self, |row, posterior, _| {
-            smoothed[row * posterior.len()..][..posterior.len()].copy_from_slice(posterior);
-        });
-        Ok(smoothed)
+        let mut smoothed = Smoothed(vec![0.0; trellis.beliefs.len()]);
+        trellis.backward(self, &mut smoothed);
+        Ok(smoothed.0)
     }
 
     /// The likeliest path of states given the whole series, and the logarithm of its density with the series (A. J. Viterbi,

@@ -79,7 +79,11 @@ impl Emission {
                     .flat_map(|i| (0..i).map(move |j| (i, j)))
                     .find(|&(i, j)| (rows[i][j] - rows[j][i]).abs() > 1e-9 * (rows[i][i] * rows[j][j]).abs().sqrt());
                 if let Some((i, j)) = uneven {
-                    return Err(RegimeError::Spread { state, what: "covariance, which is not symmetric,", found: rows[i][j] });
+                    return Err(RegimeError::Spread {
+                        state,
+                        what: "covariance, which is not symmetric,",
+                        found: rows[i][j],
+                    });
                 }
                 let determinant = matrix.determinant();
                 match Cholesky::new(matrix) {
@@ -113,6 +117,8 @@ pub(super) struct Densities {
     triangular: bool,
     /// Logarithm of the density at the mean.
     peaks: Vec<f64>,
+    /// The largest of them: no density is above it.
+    pub highest: f64,
     /// Degrees of freedom, where the states have any.
     pub degrees: Option<Vec<f64>>,
 }
@@ -131,6 +137,7 @@ impl Densities {
             whitening: vec![],
             triangular,
             peaks: vec![],
+            highest: f64::NEG_INFINITY,
             degrees: heavy.then(Vec::new),
         };
         for (state, emission) in emissions.iter().enumerate() {
@@ -139,9 +146,11 @@ impl Densities {
             }
             let factor = emission.factor(state)?;
             let determinant: f64 = factor.diagonal().iter().map(|d| d.ln()).sum();
-            let inverse = factor
-                .solve_lower_triangular(&DMatrix::identity(width, width))
-                .ok_or(RegimeError::Spread { state, what: "variance", found: 0.0 })?;
+            let inverse = factor.solve_lower_triangular(&DMatrix::identity(width, width)).ok_or(RegimeError::Spread {
+                state,
+                what: "variance",
+                found: 0.0,
+            })?;
             densities.means.extend(&emission.mean);
             for row in 0..width {
                 let from = if triangular { 0 } else { row };
@@ -153,9 +162,14 @@ impl Densities {
                 Some(nu) => ln_gamma(0.5 * (nu + wide)) - ln_gamma(0.5 * nu) - 0.5 * wide * (nu * std::f64::consts::PI).ln(),
             };
             densities.peaks.push(peak - determinant);
+            densities.highest = densities.highest.max(peak - determinant);
             if let Some(degrees) = &mut densities.degrees {
                 let Some(nu) = emission.degrees else {
-                    return Err(RegimeError::Shape { what: "states with degrees of freedom", found: state, expected: emissions.len() });
+                    return Err(RegimeError::Shape {
+                        what: "states with degrees of freedom",
+                        found: state,
+                        expected: emissions.len(),
+                    });
                 };
                 degrees.push(nu);
             }
@@ -192,24 +206,38 @@ impl Densities {
     }
 
     /// Writes the logarithm of each state's density at `row`; 0 in all states where the row was lost.
-    #[inline]
+    #[inline(always)]
     pub fn logarithms(&self, row: &[f64], into: &mut [f64]) {
+        self.evaluate(row, into, 0.0, |log| log);
+    }
+
+    /// Writes each state's density at `row` over the highest that any has; the same in all states where the row was lost.
+    #[inline(always)]
+    pub fn weights(&self, row: &[f64], into: &mut [f64]) {
+        self.evaluate(row, into, self.highest, f64::exp);
+    }
+
+    #[inline(always)]
+    fn evaluate(&self, row: &[f64], into: &mut [f64], less: f64, of: impl Fn(f64) -> f64) {
+        let states = into.len();
         if is_lost(row) {
-            into.fill(0.0);
-            return;
-        }
-        match &self.degrees {
-            None => {
-                for (state, log) in into.iter_mut().enumerate() {
-                    *log = self.peaks[state] - 0.5 * self.distance(state, row);
-                }
+            into.fill(of(0.0));
+        } else if let Some(degrees) = &self.degrees {
+            let wide = self.width as f64;
+            for (state, value) in into.iter_mut().enumerate() {
+                let nu = degrees[state];
+                *value = of(self.peaks[state] - less - 0.5 * (nu + wide) * (self.distance(state, row) / nu).ln_1p());
             }
-            Some(degrees) => {
-                let wide = self.width as f64;
-                for (state, log) in into.iter_mut().enumerate() {
-                    let nu = degrees[state];
-                    *log = self.peaks[state] - 0.5 * (nu + wide) * (self.distance(state, row) / nu).ln_1p();
-                }
+        } else if let [x] = row {
+            // Most series have one column: no more is done than must be.
+            let (means, whitening, peaks) = (&self.means[..states], &self.whitening[..states], &self.peaks[..states]);
+            for (((value, mean), whiten), peak) in into.iter_mut().zip(means).zip(whitening).zip(peaks) {
+                let white = (x - mean) * whiten;
+                *value = of(peak - less - 0.5 * (white * white).min(FARTHEST));
+            }
+        } else {
+            for (state, value) in into.iter_mut().enumerate() {
+                *value = of(self.peaks[state] - less - 0.5 * self.distance(state, row));
             }
         }
     }

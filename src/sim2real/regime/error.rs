@@ -4,7 +4,9 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RegimeError {
     /// Fewer samples than what is asked for needs.
-    #[error("{what}: {found} samples, where at least {needed} are needed\nhint: give a longer series, or ask for less of it")]
+    #[error(
+        "{what}: {found} samples, where at least {needed} are needed\nhint: give a longer series, or ask for less of it"
+    )]
     TooShort {
         /// What was to be done with them.
         what: &'static str,
@@ -68,7 +70,9 @@ pub enum RegimeError {
         found: Vec<f64>,
     },
     /// Parts of a model that do not go together.
-    #[error("{what}: {found}, where {expected} are expected\nhint: a model has one row and one column of transitions a state, and all states have one width")]
+    #[error(
+        "{what}: {found}, where {expected} are expected\nhint: a model has one row and one column of transitions a state, and all states have one width"
+    )]
     Shape {
         /// Which part.
         what: &'static str,
@@ -78,7 +82,9 @@ pub enum RegimeError {
         expected: usize,
     },
     /// A spread that is none: a variance of 0 or less, a covariance that is not positive definite.
-    #[error("state {state}: its {what} is {found}\nhint: variances and degrees of freedom are above 0, covariances positive definite")]
+    #[error(
+        "state {state}: its {what} is {found}\nhint: variances and degrees of freedom are above 0, covariances positive definite"
+    )]
     Spread {
         /// State, from 0.
         state: usize,
@@ -88,18 +94,15 @@ pub enum RegimeError {
         found: f64,
     },
     /// A chain in which some states are never left for others has no one stationary distribution.
-    #[error("the chain does not lead from every state to every other\nhint: it has no one stationary distribution; fit fewer states")]
+    #[error(
+        "the chain does not lead from every state to every other\nhint: it has no one stationary distribution; fit fewer states"
+    )]
     Reducible,
 }
 
 impl RegimeError {
     /// `value`, if `holds` of it.
-    pub(super) fn setting(
-        name: &'static str,
-        found: f64,
-        holds: bool,
-        hint: &'static str,
-    ) -> Result<(), Self> {
+    pub(super) fn setting(name: &'static str, found: f64, holds: bool, hint: &'static str) -> Result<(), Self> {
         if holds { Ok(()) } else { Err(Self::Setting { name, found, hint }) }
     }
 

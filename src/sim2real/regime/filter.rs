@@ -1,7 +1,6 @@
 //! The probability of each state given what is known by now, one observation at a time.
 
-use super::observations::is_lost;
-use super::trellis::{absorb, predict};
+use super::trellis::{LogProduct, absorb, follow, predict};
 use super::{HiddenMarkov, Observations, RegimeError};
 
 /// A model that follows a series as it comes. After each row it holds the probability of each state given all rows up to
@@ -14,7 +13,7 @@ pub struct Filter {
     belief: Vec<f64>,
     predicted: Vec<f64>,
     weights: Vec<f64>,
-    log_likelihood: f64,
+    likelihood: LogProduct,
     rows: u64,
 }
 
@@ -24,7 +23,7 @@ impl Filter {
     pub fn new(model: HiddenMarkov) -> Self {
         let predicted = model.initial().to_vec();
         let nothing = vec![0.0; predicted.len()];
-        Self { belief: predicted.clone(), predicted, weights: nothing, log_likelihood: 0.0, rows: 0, model }
+        Self { belief: predicted.clone(), predicted, weights: nothing, likelihood: LogProduct::ONE, rows: 0, model }
     }
 
     /// Takes the next row, and gives the probability of each state.
@@ -40,11 +39,8 @@ impl Filter {
             predict(self.model.transition(), &self.belief, &mut self.predicted);
         }
         self.rows += 1;
-        let evidence =
-            absorb(self.model.densities(), row, &self.predicted, &mut self.weights, &mut self.belief);
-        if !is_lost(row) {
-            self.log_likelihood += evidence.logarithm();
-        }
+        let evidence = absorb(self.model.densities(), row, &self.predicted, &mut self.weights, &mut self.belief);
+        self.likelihood.multiply(evidence);
         Ok(&self.belief)
     }
 
@@ -67,7 +63,7 @@ impl Filter {
     /// Logarithm of the density of all rows so far.
     #[must_use]
     pub fn log_likelihood(&self) -> f64 {
-        self.log_likelihood
+        self.likelihood.logarithm()
     }
 
     /// Number of rows so far.
@@ -90,8 +86,8 @@ impl HiddenMarkov {
     /// A series of another width than the model's.
     pub fn filter(&self, series: Observations) -> Result<Vec<f64>, RegimeError> {
         self.check(series)?;
-        let mut trellis = super::trellis::Trellis::default();
-        trellis.forward(self, series);
-        Ok(trellis.beliefs)
+        let mut beliefs = Vec::with_capacity(series.len() * self.states());
+        follow(self, series, |belief| beliefs.extend_from_slice(belief));
+        Ok(beliefs)
     }
 }

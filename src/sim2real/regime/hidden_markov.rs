@@ -266,12 +266,8 @@ mod tests {
     /// The shares of a chain of four states are left unchanged by a step.
     #[test]
     fn a_step_leaves_the_stationary_distribution_as_it_is() {
-        let transition: Vec<Vec<f64>> = vec![
-            vec![0.9, 0.1, 0.0, 0.0],
-            vec![0.0, 0.8, 0.15, 0.05],
-            vec![0.3, 0.0, 0.7, 0.0],
-            vec![0.0, 0.0, 1.0, 0.0],
-        ];
+        let transition: Vec<Vec<f64>> =
+            vec![vec![0.9, 0.1, 0.0, 0.0], vec![0.0, 0.8, 0.15, 0.05], vec![0.3, 0.0, 0.7, 0.0], vec![0.0, 0.0, 1.0, 0.0]];
         let states = (1..=4).map(|v| state(0.0, f64::from(v))).collect();
         let model = HiddenMarkov::new(vec![0.25; 4], transition.clone(), states).unwrap();
         let share = model.stationary().unwrap();

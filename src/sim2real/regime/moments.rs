@@ -27,6 +27,7 @@ pub(super) struct Moments {
     /// Of their squares, `[state][column]`, or of their products, `[state][column][column]`, of which the lower half is set.
     second: Vec<f64>,
     full: bool,
+    heavy: bool,
 }
 
 impl Moments {
@@ -43,6 +44,7 @@ impl Moments {
             second: vec![0.0; second],
             centers,
             full,
+            heavy: false,
         }
     }
 
@@ -50,11 +52,23 @@ impl Moments {
     #[inline(always)]
     pub fn add(&mut self, row: &[f64], probabilities: &[f64], densities: Option<&Densities>) {
         if let Some((densities, degrees)) = densities.and_then(|d| Some((d, d.degrees.as_ref()?))) {
+            self.heavy = true;
             for (state, probability) in probabilities.iter().enumerate() {
                 let nu = degrees[state];
                 let weight = (nu + self.width as f64) / (nu + densities.distance(state, row));
                 self.spans[state] += probability * (weight.ln() - weight);
                 self.add_to(state, row, *probability, probability * weight);
+            }
+        } else if let [x] = row {
+            let states = probabilities.len();
+            let (rows, centers) = (&mut self.rows[..states], &self.centers[..states]);
+            let (first, second) = (&mut self.first[..states], &mut self.second[..states]);
+            for state in 0..states {
+                let deviation = x - centers[state];
+                let weighted = probabilities[state] * deviation;
+                rows[state] += probabilities[state];
+                first[state] += weighted;
+                second[state] += weighted * deviation;
             }
         } else {
             for (state, probability) in probabilities.iter().enumerate() {
@@ -63,16 +77,15 @@ impl Moments {
         }
     }
 
+    /// Weight of a state's rows: of a Gaussian all count as they are.
+    fn weight(&self, state: usize) -> f64 {
+        if self.heavy { self.weights[state] } else { self.rows[state] }
+    }
+
     #[inline(always)]
     fn add_to(&mut self, state: usize, row: &[f64], probability: f64, weight: f64) {
         self.rows[state] += probability;
         self.weights[state] += weight;
-        if self.width == 1 {
-            let deviation = row[0] - self.centers[state];
-            self.first[state] += weight * deviation;
-            self.second[state] += weight * deviation * deviation;
-            return;
-        }
         let from = state * self.width;
         for (i, x) in row.iter().enumerate() {
             let deviation = x - self.centers[from + i];
@@ -94,7 +107,7 @@ impl Moments {
         if self.rows[state] < 1.0 {
             return None;
         }
-        let (columns, weight) = (state * self.width..(state + 1) * self.width, self.weights[state]);
+        let (columns, weight) = (state * self.width..(state + 1) * self.width, self.weight(state));
         let shift: Vec<f64> = self.first[columns.clone()].iter().map(|sum| sum / weight).collect();
         let mean = shift.iter().zip(&self.centers[columns.clone()]).map(|(shift, center)| center + shift).collect();
         let spread = if self.full {
@@ -118,7 +131,7 @@ impl Moments {
 
     /// The covariance, of which no direction is narrower than the floors.
     fn covariance(&self, state: usize, shift: &[f64], floors: &[f64]) -> Vec<Vec<f64>> {
-        let (width, weight) = (self.width, self.weights[state]);
+        let (width, weight) = (self.width, self.weight(state));
         let sums = &self.second[state * width * width..][..width * width];
         let scaled = DMatrix::from_fn(width, width, |i, j| {
             let sum = sums[i.max(j) * width + i.min(j)];

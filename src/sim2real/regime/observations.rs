@@ -81,6 +81,7 @@ impl<'a> Observations<'a> {
 }
 
 /// Whether a row was lost.
+#[inline(always)]
 pub(super) fn is_lost(row: &[f64]) -> bool {
     row.iter().any(|x| x.is_nan())
 }

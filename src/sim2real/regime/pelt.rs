@@ -298,7 +298,12 @@ mod tests {
     fn the_noise_is_found_under_changes() {
         let mut draws = Seed(12).stream("noise");
         let steps = (0..20_000).map(|row| 10.0 * f64::from(row / 1_000 % 2));
-        let series: Vec<f64> = steps.map(|level| { let e: f64 = StandardNormal.sample(&mut *draws); level + 3.0 * e }).collect();
+        let series: Vec<f64> = steps
+            .map(|level| {
+                let e: f64 = StandardNormal.sample(&mut *draws);
+                level + 3.0 * e
+            })
+            .collect();
         let variance = noise_variance(&series).unwrap();
         assert!((variance / 9.0 - 1.0).abs() < 0.05, "{variance}");
         assert_eq!(noise_variance(&[1.0, 1.0, 1.0, 2.0]), None);

@@ -130,9 +130,7 @@ impl RunLengths {
         let mut peak = f64::NEG_INFINITY;
         for run in 0..runs.starts.len() {
             let foretold = match self.assumed.prior {
-                Prior::NormalInverseGamma { strength, shape, .. } => {
-                    runs.learn(run, value, strength, shape, &self.peaks)
-                }
+                Prior::NormalInverseGamma { strength, shape, .. } => runs.learn(run, value, strength, shape, &self.peaks),
                 Prior::KnownVariance { spread, variance, .. } => runs.learn_mean(run, value, spread, variance),
             };
             runs.best[run] += foretold;
@@ -157,7 +155,8 @@ impl RunLengths {
             self.order.clear();
             self.order.extend(0..runs.starts.len());
             let probability = &runs.probability;
-            let (_, last, _) = self.order.select_nth_unstable_by(most - 1, |a, b| probability[*b].total_cmp(&probability[*a]));
+            let (_, last, _) =
+                self.order.select_nth_unstable_by(most - 1, |a, b| probability[*b].total_cmp(&probability[*a]));
             bound = bound.max(probability[*last]);
         }
         let mut kept = 0;
@@ -229,9 +228,11 @@ impl RunLengths {
         let mut lengths = Self::new(assumed)?;
         let before = series.iter().map(|value| lengths.follow(*value)).collect::<Result<Vec<u64>, _>>()?;
         let runs = &lengths.runs;
-        let last = runs.best.iter().zip(&runs.starts).fold((f64::NEG_INFINITY, 0), |best, (of, start)| {
-            if *of > best.0 { (*of, *start) } else { best }
-        });
+        let last = runs
+            .best
+            .iter()
+            .zip(&runs.starts)
+            .fold((f64::NEG_INFINITY, 0), |best, (of, start)| if *of > best.0 { (*of, *start) } else { best });
         let mut changes = vec![];
         let mut start = last.1 as usize;
         while start > 0 {

@@ -51,15 +51,7 @@ impl Settings {
     /// `states` states with Gaussian columns: 6 starts, 500 iterations, a tolerance of 1e-8, a floor of 1e-6.
     #[must_use]
     pub fn new(states: usize) -> Self {
-        Self {
-            states,
-            family: Family::Gaussian,
-            starts: 6,
-            iterations: 500,
-            tolerance: 1e-8,
-            floor: 1e-6,
-            seed: Seed(0),
-        }
+        Self { states, family: Family::Gaussian, starts: 6, iterations: 500, tolerance: 1e-8, floor: 1e-6, seed: Seed(0) }
     }
 
     pub(super) fn check(&self) -> Result<(), RegimeError> {

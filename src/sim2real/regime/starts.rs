@@ -48,11 +48,8 @@ impl Features {
         let mut values = vec![];
         let mut sums = vec![0.0; width];
         for part in series {
-            let rows: Vec<f64> = part
-                .iter()
-                .filter(|row| !is_lost(row))
-                .flat_map(|row| standardized(row, center, variances))
-                .collect();
+            let rows: Vec<f64> =
+                part.iter().filter(|row| !is_lost(row)).flat_map(|row| standardized(row, center, variances)).collect();
             let count = rows.len() / width;
             let half = window / 2;
             for row in 0..count {
@@ -154,12 +151,7 @@ fn squared(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The model of rows whose states are known.
-fn model(
-    series: &[Observations],
-    labels: &[usize],
-    settings: &Settings,
-    variances: &[f64],
-) -> Option<HiddenMarkov> {
+fn model(series: &[Observations], labels: &[usize], settings: &Settings, variances: &[f64]) -> Option<HiddenMarkov> {
     let states = settings.states;
     let mut counts = vec![vec![1.0; states]; states];
     let means = group_means(series, labels, states);

@@ -1,6 +1,7 @@
 //! The recursions forward and backward over a series, scaled so that no product of densities under- or overflows.
 
 use super::emission::Densities;
+use super::observations::is_lost;
 use super::{HiddenMarkov, Observations};
 
 /// Below this the evidence of a row is added up in logarithms: almost only states that cannot be would explain it.
@@ -31,21 +32,16 @@ fn predict_of(states: usize, transition: &[f64], belief: &[f64], next: &mut [f64
     }
 }
 
-/// What a row says: its probability density given all before, as `exp(peak) * scale`.
+/// What a row says: its probability density given all before, as `exp(peak) / inverse`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Evidence {
-    pub peak: f64,
-    pub scale: f64,
-}
-
-impl Evidence {
-    pub fn logarithm(self) -> f64 {
-        self.peak + self.scale.ln()
-    }
+    peak: f64,
+    scale: f64,
+    inverse: f64,
 }
 
 /// Turns what was predicted into what is believed once `row` is known. `weights` is left at the density of each state over
-/// `exp(peak)`; a state that cannot be may be left at 0.
+/// `exp(peak)`; of a state that cannot be it may be left at 0.
 #[inline(always)]
 pub(super) fn absorb(
     densities: &Densities,
@@ -54,11 +50,9 @@ pub(super) fn absorb(
     weights: &mut [f64],
     belief: &mut [f64],
 ) -> Evidence {
-    densities.logarithms(row, weights);
-    let peak = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    densities.weights(row, weights);
     let mut scale = 0.0;
-    for ((weight, before), after) in weights.iter_mut().zip(predicted).zip(belief.iter_mut()) {
-        *weight = (*weight - peak).exp();
+    for ((weight, before), after) in weights.iter().zip(predicted).zip(belief.iter_mut()) {
         *after = *weight * before;
         scale += *after;
     }
@@ -69,18 +63,14 @@ pub(super) fn absorb(
     for after in belief.iter_mut() {
         *after *= inverse;
     }
-    Evidence { peak, scale }
+    let peak = if is_lost(row) { 0.0 } else { densities.highest };
+    Evidence { peak, scale, inverse }
 }
 
 /// The same in logarithms, over the states that can be.
 #[cold]
-fn absorb_faint(
-    densities: &Densities,
-    row: &[f64],
-    predicted: &[f64],
-    weights: &mut [f64],
-    belief: &mut [f64],
-) -> Evidence {
+#[inline(never)]
+fn absorb_faint(densities: &Densities, row: &[f64], predicted: &[f64], weights: &mut [f64], belief: &mut [f64]) -> Evidence {
     densities.logarithms(row, belief);
     let mut peak = f64::NEG_INFINITY;
     for (log, before) in belief.iter_mut().zip(predicted) {
@@ -96,29 +86,59 @@ fn absorb_faint(
         *after /= sum;
         *weight = if *before > 0.0 { (*after / before).min(LARGEST) } else { 0.0 };
     }
-    Evidence { peak: peak + sum.ln(), scale: 1.0 }
+    Evidence { peak: peak + sum.ln(), scale: 1.0, inverse: 1.0 }
 }
 
-/// A sum of logarithms that takes one for many factors.
-#[derive(Debug, Clone, Copy)]
-struct LogProduct {
+/// The logarithm of a product of evidence, which takes one logarithm for many factors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LogProduct {
     sum: f64,
     product: f64,
 }
 
 impl LogProduct {
-    fn multiply(&mut self, factor: f64) {
-        if factor < 1e-100 {
-            self.sum += factor.ln();
-            return;
-        }
-        self.product *= factor;
-        // A scale is at most the number of states.
-        if !(1e-150..=1e150).contains(&self.product) {
-            self.sum += self.product.ln();
+    /// Of nothing.
+    pub const ONE: Self = Self { sum: 0.0, product: 1.0 };
+
+    #[inline(always)]
+    pub fn multiply(&mut self, evidence: Evidence) {
+        self.sum += evidence.peak;
+        let product = self.product * evidence.scale;
+        // A scale is at least `FAINT` and, but for rounding, at most 1.
+        if product < 1e-300 {
+            self.sum += self.product.ln() + evidence.scale.ln();
             self.product = 1.0;
+        } else {
+            self.product = product;
         }
     }
+
+    pub fn logarithm(self) -> f64 {
+        self.sum + self.product.ln()
+    }
+}
+
+/// Who is shown the rows by [`Trellis::backward`], the last first.
+pub(super) trait Visit {
+    /// The number of a row, the probability of each state given the whole series, and for each state how much more likely its row
+    /// and all that follow are than they were given all before: the expected number of transitions into this row is
+    /// `belief[i] transition[i][j] ahead[j]`.
+    fn visit(&mut self, row: usize, posterior: &[f64], ahead: &[f64]);
+}
+
+/// Runs forward over a series, shows each row's belief, and gives the log-likelihood: bit by bit what [`Trellis::forward`] finds,
+/// without its memory.
+pub(super) fn follow(model: &HiddenMarkov, series: Observations, mut see: impl FnMut(&[f64])) -> f64 {
+    let states = model.states();
+    let mut predicted = model.initial().to_vec();
+    let (mut weights, mut belief) = (vec![0.0; states], vec![0.0; states]);
+    let mut total = LogProduct::ONE;
+    for row in series.iter() {
+        total.multiply(absorb(model.densities(), row, &predicted, &mut weights, &mut belief));
+        see(&belief);
+        predict(model.transition(), &belief, &mut predicted);
+    }
+    total.logarithm()
 }
 
 /// What the recursion forward found, row after row.
@@ -150,35 +170,31 @@ impl Trellis {
     #[inline(always)]
     fn forward_of(&mut self, states: usize, model: &HiddenMarkov, series: Observations) {
         let mut predicted = model.initial().to_vec();
-        let mut total = LogProduct { sum: 0.0, product: 1.0 };
+        let mut total = LogProduct::ONE;
         let rows = self.beliefs.chunks_exact_mut(states).zip(self.ratios.chunks_exact_mut(states));
         for (row, (belief, ratio)) in series.iter().zip(rows) {
             let evidence = absorb(model.densities(), row, &predicted, ratio, belief);
-            let inverse = 1.0 / evidence.scale;
             for weight in ratio.iter_mut() {
-                *weight *= inverse;
+                *weight *= evidence.inverse;
             }
-            total.sum += evidence.peak;
-            total.multiply(evidence.scale);
+            total.multiply(evidence);
             predict_of(states, model.transition(), belief, &mut predicted);
         }
-        self.log_likelihood = total.sum + total.product.ln();
+        self.log_likelihood = total.logarithm();
     }
 
-    /// Runs backward, and shows for each row, the last first: its number, the probability of each state given the whole
-    /// series, and for each state how much more likely its row and all that follow are than they were given all before
-    /// (`ahead`): the expected number of transitions into this row is `belief[i] transition[i][j] ahead[j]`.
-    pub fn backward(&self, model: &HiddenMarkov, visit: impl FnMut(usize, &[f64], &[f64])) {
+    /// Runs backward over what the recursion forward found.
+    pub fn backward(&self, model: &HiddenMarkov, visitor: &mut impl Visit) {
         match self.states {
-            2 => self.backward_of(2, model, visit),
-            3 => self.backward_of(3, model, visit),
-            4 => self.backward_of(4, model, visit),
-            states => self.backward_of(states, model, visit),
+            2 => self.backward_of(2, model, visitor),
+            3 => self.backward_of(3, model, visitor),
+            4 => self.backward_of(4, model, visitor),
+            states => self.backward_of(states, model, visitor),
         }
     }
 
     #[inline(always)]
-    fn backward_of(&self, states: usize, model: &HiddenMarkov, mut visit: impl FnMut(usize, &[f64], &[f64])) {
+    fn backward_of(&self, states: usize, model: &HiddenMarkov, visitor: &mut impl Visit) {
         let (mut beta, mut posterior, mut ahead) = (vec![1.0; states], vec![0.0; states], vec![0.0; states]);
         let (beta, posterior, ahead) = (&mut beta[..states], &mut posterior[..states], &mut ahead[..states]);
         let rows = self.beliefs.chunks_exact(states).zip(self.ratios.chunks_exact(states));
@@ -193,7 +209,7 @@ impl Trellis {
             for probability in posterior.iter_mut() {
                 *probability *= inverse;
             }
-            visit(row, posterior, ahead);
+            visitor.visit(row, posterior, ahead);
             for (before, transitions) in beta.iter_mut().zip(model.transition().chunks_exact(states)) {
                 let mut product = 0.0;
                 for (probability, after) in transitions.iter().zip(ahead.iter()) {

@@ -43,8 +43,7 @@ pub fn kolmogorov_smirnov(one: &[f64], other: &[f64]) -> Result<Apart, RegimeErr
 pub fn wasserstein(one: &[f64], other: &[f64], permutations: usize, seed: Seed) -> Result<Apart, RegimeError> {
     RegimeError::setting("permutations", permutations as f64, permutations >= 1, "a whole number from 1, such as 999")?;
     let (first, second) = (sorted(one)?, sorted(other)?);
-    let mut pooled: Vec<(f64, bool)> =
-        first.iter().map(|x| (*x, true)).chain(second.iter().map(|x| (*x, false))).collect();
+    let mut pooled: Vec<(f64, bool)> = first.iter().map(|x| (*x, true)).chain(second.iter().map(|x| (*x, false))).collect();
     pooled.sort_by(|a, b| a.0.total_cmp(&b.0));
     let values: Vec<f64> = pooled.iter().map(|(x, _)| *x).collect();
     let belongs: Vec<bool> = pooled.iter().map(|(_, of_first)| *of_first).collect();
@@ -220,10 +219,8 @@ mod tests {
         assert!((140..=230).contains(&small), "{small} of 2000");
         let large = count(&|k| kolmogorov_smirnov(&noise(500, 2 * k), &noise(600, 2 * k + 1)).unwrap().p_value < 0.1, 1_000);
         assert!((70..=130).contains(&large), "{large} of 1000");
-        let area = count(
-            &|k| wasserstein(&noise(20, 2 * k), &noise(30, 2 * k + 1), 99, Seed(k)).unwrap().p_value <= 0.1,
-            1_000,
-        );
+        let area =
+            count(&|k| wasserstein(&noise(20, 2 * k), &noise(30, 2 * k + 1), 99, Seed(k)).unwrap().p_value <= 0.1, 1_000);
         assert!((70..=130).contains(&area), "{area} of 1000");
     }
 
