@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use trueup::sim2real::Seed;
 use trueup::sim2real::regime::{
     Assumed, Collapse, Cost, Degrees, Division, Emission, Family, Filter, HiddenMarkov, Observations, Penalty, Prior,
-    RegimeError, RunLengths, Settings, Spread, fit, fit_states,
+    RegimeError, RunLengths, Settings, Spread, fit, fit_states, refit,
 };
 
 /// Annual flow of the Nile at Aswan, 1871 to 1970 [1e8 m³]: G. W. Cobb, *The problem of the Nile*, Biometrika 65 (1978); the data
@@ -202,6 +202,22 @@ fn several_series_and_lost_rows() {
     assert_eq!(found.observed, 4_800);
     let ratio = found.model.emissions()[2].volatility() / truth.emissions()[2].volatility();
     assert!((ratio - 1.0).abs() < 0.15, "{ratio}");
+}
+
+/// Halfway and on from there is the whole way; from another width there is none.
+#[test]
+fn a_model_goes_on_from_where_it_was_kept() {
+    let drawn = market().simulate(3_000, Seed(10));
+    let series = [Observations::of(&drawn.values).unwrap()];
+    let settings = Settings { starts: 1, ..Settings::new(3) };
+    let whole = fit(&series, &settings).unwrap();
+    let half = fit(&series, &Settings { iterations: 4, ..settings }).unwrap();
+    let kept: HiddenMarkov = serde_json::from_str(&serde_json::to_string(&half.model).unwrap()).unwrap();
+    let found = refit(&kept, &series, &Settings::new(1)).unwrap();
+    assert!(found.converged && found.iterations < whole.iterations);
+    assert!((found.log_likelihood - whole.log_likelihood).abs() < 1e-2, "{} {}", found.log_likelihood, whole.log_likelihood);
+    let wide = Observations::rows(&drawn.values, 2).unwrap();
+    assert!(matches!(refit(&kept, &[wide], &settings), Err(RegimeError::Width { width: 1, found: 2 })));
 }
 
 /// A long series is begun on a sample of it, and ends where it would have.

@@ -97,6 +97,22 @@ pub fn fit(series: &[Observations], settings: &Settings) -> Result<Fit, RegimeEr
     Ok(told(best, settings, &floors, whole.observed, starts))
 }
 
+/// Fits a model further, from where it is: a model that was kept, brought up to newer rows. Of `settings`, states are the model's own,
+/// and nothing is drawn.
+///
+/// # Errors
+/// As [`fit`]; series of another width than the model's.
+pub fn refit(model: &HiddenMarkov, series: &[Observations], settings: &Settings) -> Result<Fit, RegimeError> {
+    let settings = &Settings { states: model.states(), ..*settings };
+    settings.check()?;
+    series.iter().try_for_each(|part| model.check(*part))?;
+    let whole = Whole::of(series, settings)?;
+    let floors: Vec<f64> = whole.variances.iter().map(|v| v * settings.floor).collect();
+    let best = climb(model.clone(), series, settings, &floors, settings.iterations);
+    let starts = vec![Some(best.log_likelihood)];
+    Ok(told(best, settings, &floors, whole.observed, starts))
+}
+
 /// What is kept of the climb, once states have been put in order.
 fn told(best: Climb, settings: &Settings, floors: &[f64], observed: usize, starts: Vec<Option<f64>>) -> Fit {
     let width = floors.len();

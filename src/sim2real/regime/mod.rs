@@ -30,7 +30,7 @@ mod starts;
 mod trellis;
 mod two_sample;
 
-pub use baum_welch::{Collapse, Fit, fit, fit_states};
+pub use baum_welch::{Collapse, Fit, fit, fit_states, refit};
 pub use cusum::{Alarm, Cusum, CusumSettings, Shift};
 pub use drift::DriftWindow;
 pub use emission::{Emission, Spread};
