@@ -1,5 +1,7 @@
 //! Regimes: models of which the answer is known, by hand or because the series were drawn from them.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop where it fails")]
+
 use proptest::prelude::*;
 use trueup::sim2real::Seed;
 use trueup::sim2real::regime::{
@@ -158,7 +160,7 @@ fn bic_finds_the_number_of_states() {
     assert_eq!((best, fits.len(), fits[best].model.states()), (2, 5, 3));
     assert!(fits.windows(2).all(|w| w[1].log_likelihood > w[0].log_likelihood - 0.5));
     assert!(fits[2].aic() < fits[1].aic());
-    let nothing = fit_states(&series, 1..=0, &Settings::new(1));
+    let nothing = fit_states(&series, std::ops::RangeInclusive::new(1, 0), &Settings::new(1));
     assert!(matches!(nothing, Err(RegimeError::Setting { name: "states", .. })));
 }
 

@@ -1,5 +1,8 @@
 //! `trueup regimes` from outside.
 
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop where it fails")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -330,8 +330,8 @@ impl Expected {
     }
 }
 
-/// Fits models of each number of states, and gives them with the one of the least BIC first to last as `states` runs. Which
-/// was best is the first of the pair, an index into the second.
+/// Fits models of each number of states in turn. The first of the pair is the place, in the second, of the one with the least BIC,
+/// of those in which no state has collapsed where there are any: one that keeps a few equal rows is as likely as its floor is low.
 ///
 /// Numbers of states that the series is too short or too poor for are left out.
 ///
@@ -350,7 +350,11 @@ pub fn fit_states(
             Err(error) => refused = Some(error),
         }
     }
-    let best = (0..fits.len()).min_by(|a, b| fits[*a].bic().total_cmp(&fits[*b].bic()));
+    let rank = |fit: &Fit| (!fit.collapsed.is_empty(), fit.bic());
+    let best = (0..fits.len()).min_by(|a, b| {
+        let ((a, of_a), (b, of_b)) = (rank(&fits[*a]), rank(&fits[*b]));
+        a.cmp(&b).then(of_a.total_cmp(&of_b))
+    });
     match (best, refused) {
         (Some(best), _) => Ok((best, fits)),
         (None, Some(error)) => Err(error),
