@@ -16,7 +16,7 @@ use trueup::sim2real::regime::{
 };
 
 /// Times each thing is timed; the least and the most are told.
-const ROUNDS: usize = 7;
+const ROUNDS: usize = 15;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let Some(folder) = std::env::args().nth(1) else {

@@ -56,7 +56,7 @@ impl<'a> Observations<'a> {
         self.values.is_empty()
     }
 
-    /// A row.
+    /// A row, by its number below [`len`](Self::len).
     #[must_use]
     pub fn row(&self, row: usize) -> &'a [f64] {
         &self.values[row * self.width..][..self.width]
@@ -67,10 +67,11 @@ impl<'a> Observations<'a> {
         self.values.chunks_exact(self.width)
     }
 
-    /// Rows `from` to `to`, the latter not among them.
+    /// Rows `from` to `to`, the latter not among them, as far as there are rows.
     #[must_use]
     pub fn slice(&self, from: usize, to: usize) -> Self {
-        Self { values: &self.values[from * self.width..to * self.width], width: self.width }
+        let to = to.min(self.len());
+        Self { values: &self.values[from.min(to) * self.width..to * self.width], width: self.width }
     }
 
     /// Number of rows that were not lost.
@@ -94,7 +95,8 @@ mod tests {
     fn rows_have_one_width() {
         let two = Observations::rows(&[1.0, 2.0, 3.0, f64::NAN, 5.0, 6.0], 2).unwrap();
         assert_eq!((two.len(), two.observed(), two.row(2)), (3, 2, [5.0, 6.0].as_slice()));
-        assert_eq!(two.slice(1, 3).row(1), [5.0, 6.0]);
+        assert_eq!(two.slice(1, 9).row(1), [5.0, 6.0]);
+        assert!(two.slice(7, 9).is_empty() && two.slice(2, 1).is_empty());
         assert_eq!(Observations::rows(&[1.0; 5], 2), Err(RegimeError::Width { width: 2, found: 5 }));
         assert_eq!(Observations::rows(&[], 0), Err(RegimeError::Width { width: 0, found: 0 }));
     }
