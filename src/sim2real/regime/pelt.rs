@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::RegimeError;
 
-/// Least variance of a stretch [variance of the whole series]: a stretch of equal values is not infinitely likely.
-const FLOOR: f64 = 1e-10;
+/// Least variance of a stretch [variance of the noise of the whole series]. Values are rounded somewhere: a few rows on one tick of a
+/// price are no stretch without noise, and would be infinitely likely as one.
+const FLOOR: f64 = 1e-2;
 
 /// What stays the same within a stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -158,7 +159,8 @@ impl Costs {
             squares += (value - center) * (value - center);
             sums.push((sum, squares));
         }
-        let unit = if kind == Cost::Mean { noise_variance(series).unwrap_or(squares / count) } else { 1.0 };
+        let noise = noise_variance(series).unwrap_or(squares / count);
+        let unit = if kind == Cost::Mean { noise } else { 1.0 };
         let parameters = if kind == Cost::MeanAndVariance { 2.0 } else { 1.0 };
         let (penalty, length_price) = match penalty {
             Penalty::Bic => ((parameters + 1.0) * count.ln() * unit, 0.0),
@@ -168,7 +170,7 @@ impl Costs {
                 (given, 0.0)
             }
         };
-        let floor = (FLOOR * squares / count).max(f64::MIN_POSITIVE);
+        let floor = (FLOOR * noise).max(f64::MIN_POSITIVE);
         Ok(Self { kind, sums, penalty, length_price, floor })
     }
 
@@ -307,6 +309,20 @@ mod tests {
         let variance = noise_variance(&series).unwrap();
         assert!((variance / 9.0 - 1.0).abs() < 0.05, "{variance}");
         assert_eq!(noise_variance(&[1.0, 1.0, 1.0, 2.0]), None);
+    }
+
+    /// Rounded to steps as wide as the noise, so that rows in a row are equal by chance.
+    #[test]
+    fn rows_on_one_tick_are_no_stretch() {
+        let mut draws = Seed(13).stream("noise");
+        let rounded = |_| {
+            let e: f64 = StandardNormal.sample(&mut *draws);
+            e.round()
+        };
+        let series: Vec<f64> = (0..5_000).map(rounded).collect();
+        assert!(series.windows(5).any(|w| w.iter().all(|x| *x == w[0])));
+        let division = Division { cost: Cost::MeanAndVariance, penalty: Penalty::Mbic, shortest: 5 };
+        assert_eq!(division.divide(&series).unwrap().changes, Vec::<usize>::new());
     }
 
     #[test]
