@@ -114,6 +114,7 @@ fn every_command_explains_itself() {
         "walk-forward",
         "reconcile",
         "prove",
+        "regimes",
         "mechanisms",
         "data",
         "data make",

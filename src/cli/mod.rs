@@ -18,6 +18,7 @@ mod mechanisms;
 mod paper;
 mod prove;
 mod reconcile;
+mod regimes;
 mod screen;
 mod stop;
 mod sweep;
@@ -64,6 +65,7 @@ enum Command {
     Audit(audit::Look),
     Sweep(sweep::Try),
     WalkForward(walk_forward::Walk),
+    Regimes(regimes::Regimes),
     Mechanisms(mechanisms::Mechanisms),
     Prove(prove::Prove),
     Data(data::Data),
@@ -109,6 +111,7 @@ impl Command {
             Self::Audit(command) => command.run(screen),
             Self::Sweep(command) => command.run(screen),
             Self::WalkForward(command) => command.run(screen),
+            Self::Regimes(command) => command.run(screen),
             Self::Mechanisms(command) => command.run(screen),
             Self::Prove(command) => command.run(screen),
             Self::Data(command) => command.run(screen),

@@ -16,6 +16,7 @@ mod parameter;
 mod plant;
 pub mod randomize;
 mod recording;
+pub mod regime;
 mod residual;
 mod run;
 mod seed;
