@@ -2,6 +2,7 @@
 
 use crate::sim2real::{Recording, Timestamp};
 
+use super::volatility_regime::restless;
 use super::{Book, InFlight, OrderLog, Seen, Side, Tape};
 
 /// Values by name, one a row; what nothing is known of has no column, and an order of which a value is not known, and a look at the
@@ -18,6 +19,8 @@ pub(super) fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, 
         let of = |row: usize| value(&log.orders()[row], &log.tape().book(log.seen_on_arrival(row))?);
         rows.clone().map(of).collect::<Vec<_>>()
     };
+    let decided: Vec<Timestamp> = log.orders().iter().map(|order| order.decided_at).collect();
+    let restless = restless(log.tape(), &decided).map_or_else(Vec::new, |all| all.into_iter().map(Some).collect());
     let columns = [
         ("quantity / size at the touch", by_book(&|order, book| Some(order.quantity / touch_size(order, book)?))),
         ("size at the touch", by_book(&touch_size)),
@@ -27,6 +30,7 @@ pub(super) fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, 
         ("quantity", by_order(&|order| Some(order.quantity))),
         ("side", by_order(&|order| Some(order.side.sign()))),
         ("volatility before", by_order(&|order| volatility(log.tape(), order.decided_at))),
+        ("probability of the restless regime", restless),
         ("own flow over 60 s before", own_flow(log.orders(), 60.0).into_iter().map(Some).collect()),
         ("return over 10 s before", by_order(&|order| move_over(log.tape(), order, -10.0, 0.0))),
         ("return over 60 s before", by_order(&|order| move_over(log.tape(), order, -60.0, 0.0))),
@@ -46,7 +50,7 @@ pub(super) fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, 
         ("return over 10 s after", by_order(&|order| move_over(log.tape(), order, 0.0, 10.0))),
     ];
     let by_row = |values: Vec<Option<f64>>| {
-        let of = |row| log.order_of(row).and_then(|number| values[number]);
+        let of = |row| log.order_of(row).and_then(|number| values.get(number).copied().flatten());
         complete((0..log.rows()).map(of).collect())
     };
     columns.into_iter().filter_map(|(name, values)| Some((name, by_row(values)?))).collect()

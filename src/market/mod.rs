@@ -111,6 +111,7 @@ mod transit;
 #[cfg(feature = "io")]
 mod twin;
 mod venue;
+mod volatility_regime;
 #[cfg(feature = "io")]
 pub mod walk_forward;
 

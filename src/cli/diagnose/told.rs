@@ -77,6 +77,10 @@ const STRETCHES: usize = 4;
 fn place(diagnosis: &Diagnosis) -> String {
     let location = &diagnosis.location;
     let mut text = location.onset.map_or_else(String::new, |onset| format!("  from {} s on\n", significant(onset, 4)));
+    for change in &location.changes {
+        let (time, factor) = (significant(change.time, 4), significant(change.factor, 2));
+        text += &format!("  {}: {factor} times the error from {time} s of {} on\n", change.channel, change.recording);
+    }
     for bin in &location.against {
         let share = format!("{} of the error in {} of the rows", percent(bin.share_of_error), percent(bin.share_of_rows));
         text += &format!("  {}: {}: {share}\n", bin.channel, range(bin));

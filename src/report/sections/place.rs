@@ -37,7 +37,8 @@ impl Section for Place<'_> {
             }
         }
         let profiles: Vec<Value> = channels.iter().map(|first| self.profiles(first)).collect();
-        let nothing = acted.is_empty() && location.intervals.is_empty() && location.against.is_empty();
+        let nothing =
+            acted.is_empty() && location.intervals.is_empty() && location.against.is_empty() && location.changes.is_empty();
         if nothing && location.onset.is_none() && profiles.is_empty() {
             return Ok(String::new());
         }
@@ -54,6 +55,14 @@ impl Section for Place<'_> {
                 }
             })
             .collect();
+        let changes: Vec<Value> = location
+            .changes
+            .iter()
+            .map(|change| {
+                let (time, factor) = (with_unit(&significant(change.time, 4), "s"), significant(change.factor, 2));
+                context! { channel => &change.channel, recording => &change.recording, time => time, factor => factor }
+            })
+            .collect();
         let against: Vec<Value> = location
             .against
             .iter()
@@ -68,6 +77,7 @@ impl Section for Place<'_> {
             context! {
                 acted => acted,
                 onset => location.onset.map(|t| with_unit(&significant(t, 4), "s")),
+                changes => changes,
                 against => against,
                 profiles => profiles,
                 intervals => intervals,

@@ -150,12 +150,28 @@ pub struct Where {
     pub intervals: Vec<Interval>,
     /// When it began [s], where it did not from the start.
     pub onset: Option<f64>,
+    /// When the error grew or shrank for good, in order of time.
+    #[serde(default)]
+    pub changes: Vec<Change>,
     /// The states that hold most of the error, the most telling first.
     #[serde(default)]
     pub against: Vec<Bin>,
     /// Where there are several recordings, the errors of each on held-out data.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingError>,
+}
+
+/// A time from which on the recalibrated twin errs more, or less, than before.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Change {
+    /// The channel.
+    pub channel: String,
+    /// The recording.
+    pub recording: String,
+    /// When [s].
+    pub time: f64,
+    /// Root mean square error after it over that before it.
+    pub factor: f64,
 }
 
 /// How far a channel of one recording is off on held-out data, before and after.

@@ -7,7 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::whiteness::autocorrelation_time;
-use super::{Bin, Interval, onset};
+use super::{Bin, Interval, changes, onset};
 use crate::sim2real::{Clock, Covariate, Recording, Twin};
 
 /// Windows into which a recording is cut, and rows of a window at the least.
@@ -77,6 +77,7 @@ pub(super) fn located<T: Twin>(
     for channel in channels {
         let own: Vec<&Track> = tracks.iter().filter(|t| t.channel == channel).collect();
         found.intervals.extend(intervals(&own));
+        found.changes.extend(changes::changes(&own));
         found.against.extend(against(&own, inquiry.twin.clock(), &|name| unit(inquiry, name)));
     }
     found.intervals.sort_by(|a, b| b.share_of_error.total_cmp(&a.share_of_error));

@@ -13,6 +13,7 @@
 mod activity;
 mod aspects;
 mod by_recording;
+mod changes;
 mod confidence;
 mod diagnosis;
 mod evidence;
@@ -38,8 +39,8 @@ mod whiteness;
 mod words;
 
 pub use diagnosis::{
-    Bin, ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment, ParameterChange, RecordingError,
-    Rival, SCHEMA, Score, Stretch, Verdict, Where,
+    Bin, Change, ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment, ParameterChange,
+    RecordingError, Rival, SCHEMA, Score, Stretch, Verdict, Where,
 };
 pub use evidence::{Evidence, HELD_OUT};
 pub use excitation::Excitation;
