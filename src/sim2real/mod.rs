@@ -14,6 +14,7 @@ pub mod identify;
 pub mod mechanism;
 mod parameter;
 mod plant;
+pub mod randomize;
 mod recording;
 mod residual;
 mod run;

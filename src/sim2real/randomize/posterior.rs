@@ -65,23 +65,26 @@ pub enum PosteriorError {
 const DIGITS: f64 = 1e6;
 
 impl Posterior {
-    /// The posterior of parameters of these `names`, with the covariance of those numbered in `free`; what has no finite standard
-    /// deviation above 0 is not in it.
+    /// The posterior of parameters of these `names`, which have this `correlation`; what has no finite standard deviation above 0
+    /// is not in it.
+    ///
+    /// Where two go together so nearly that the digits written do not tell them apart, all correlations are brought nearer to 0,
+    /// by the least power of ten that makes numbers with these correlations possible.
     #[must_use]
-    pub fn of_fit(names: &[String], values: &[f64], std: &[f64], free: &[usize], covariance: Option<&DMatrix<f64>>) -> Self {
+    pub fn of_fit(names: &[String], values: &[f64], std: &[f64], correlation: &DMatrix<f64>) -> Self {
         let known: Vec<usize> = (0..names.len()).filter(|k| std[*k].is_finite() && std[*k] > 0.0).collect();
-        let correlation = |a: usize, b: usize| -> f64 {
-            let place = |k: usize| free.iter().position(|other| *other == k);
-            let (Some(covariance), Some(i), Some(j)) = (covariance, place(a), place(b)) else { return 0.0 };
-            let found = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
-            // Rounding of what is written must not lead to 1.
-            if found.is_finite() { ((found * DIGITS).round() / DIGITS).clamp(-0.999_999, 0.999_999) } else { 0.0 }
+        let written = |nearer: f64| {
+            let of = |i: usize, j: usize| (correlation[(known[i], known[j])] * (1.0 - nearer) * DIGITS).round() / DIGITS;
+            DMatrix::from_fn(known.len(), known.len(), |i, j| if i == j { 1.0 } else { of(i, j) })
         };
+        let powers = [0.0].into_iter().chain((1..=6).rev().map(|power| 10.0_f64.powi(-power)));
+        let possible = |matrix: &DMatrix<f64>| matrix.is_empty() || matrix.clone().symmetric_eigenvalues().min() > 1e-7;
+        let told = powers.map(written).find(possible).unwrap_or_else(|| written(1.0));
         Self {
             names: known.iter().map(|k| names[*k].clone()).collect(),
             values: known.iter().map(|k| values[*k]).collect(),
             std: known.iter().map(|k| std[*k]).collect(),
-            correlation: (1..known.len()).map(|i| (0..i).map(|j| correlation(known[i], known[j])).collect()).collect(),
+            correlation: (1..known.len()).map(|i| (0..i).map(|j| told[(i, j)]).collect()).collect(),
         }
     }
 
@@ -167,8 +170,8 @@ mod tests {
 
     fn posterior() -> Posterior {
         let names = ["inertia", "gain", "coulomb_friction.torque"].map(str::to_owned);
-        let covariance = DMatrix::from_row_slice(2, 2, &[0.04, -0.012, -0.012, 0.01]);
-        Posterior::of_fit(&names, &[1.0, 1.0, 0.5], &[0.2, 0.0, 0.1], &[0, 2], Some(&covariance))
+        let correlation = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, -0.6, 0.0, 1.0, 0.0, -0.6, 0.0, 1.0]);
+        Posterior::of_fit(&names, &[1.0, 1.0, 0.5], &[0.2, 0.0, 0.1], &correlation)
     }
 
     #[test]
@@ -196,6 +199,19 @@ mod tests {
         assert!((mean(0) - 1.0).abs() < 0.005 && (mean(1) - 0.5).abs() < 0.01);
         let together: f64 = table.row(0).iter().zip(table.row(1)).map(|(a, b)| (a - mean(0)) * (b - mean(1))).sum();
         assert!((together / n + 0.012).abs() < 0.001, "{}", together / n);
+    }
+
+    #[test]
+    fn what_always_goes_together_is_written_so_that_it_can_be_drawn() {
+        let names = ["a", "b", "c"].map(str::to_owned);
+        let (near, rest) = (1.0 - 1e-12, 0.5);
+        let correlation = DMatrix::from_row_slice(3, 3, &[1.0, near, rest, near, 1.0, rest, rest, rest, 1.0]);
+        let posterior = Posterior::of_fit(&names, &[1.0; 3], &[0.1; 3], &correlation);
+        posterior.check().unwrap();
+        assert!(posterior.correlation[0][0] > 0.999 && posterior.correlation[1][0] > 0.499, "{posterior:?}");
+        let whole = |k: usize| posterior.randomized(k, Parameter::new("p", "", 1.0), Redraw::Reset);
+        let all = (0..3).map(|k| Randomized { target: posterior.target(k), ..whole(k) }).collect();
+        Randomizer::new(all, posterior.correlations()).unwrap();
     }
 
     #[test]
