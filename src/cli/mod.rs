@@ -11,6 +11,7 @@ mod checkpoint;
 mod data;
 mod demo;
 mod diagnose;
+mod draws;
 mod figures;
 mod fitted;
 mod log_arguments;
@@ -18,6 +19,7 @@ mod mechanisms;
 mod paper;
 mod prove;
 mod reconcile;
+mod rollout;
 mod screen;
 mod stop;
 mod sweep;
@@ -58,6 +60,7 @@ enum Command {
     Demo(demo::Demo),
     Diagnose(diagnose::Diagnose),
     Calibrate(calibrate::Calibrate),
+    Rollout(rollout::Rollout),
     Backtest(backtest::Run),
     Paper(paper::Paper),
     Reconcile(reconcile::Reconcile),
@@ -103,6 +106,7 @@ impl Command {
             Self::Demo(command) => command.run(screen),
             Self::Diagnose(command) => command.run(screen),
             Self::Calibrate(command) => command.run(screen),
+            Self::Rollout(command) => command.run(screen),
             Self::Backtest(command) => command.run(screen),
             Self::Paper(command) => command.run(screen),
             Self::Reconcile(command) => command.run(screen),

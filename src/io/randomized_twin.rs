@@ -6,9 +6,9 @@ use super::randomize_section::{RandomizeSection, RandomizedEntry};
 use super::twin_file::TwinFile;
 use super::unit::check_unit;
 use crate::sim2real::randomize::{
-    Correlation, Level, Posterior, Preset, Randomized, RandomizeError, Randomizer, Redraw, Target,
+    Correlation, DrawTable, Level, Posterior, Preset, RandomizeError, Randomized, Randomizer, Redraw, Target,
 };
-use crate::sim2real::{Assembly, Mechanism, Parameter, Plant, Simulator};
+use crate::sim2real::{Assembly, Mechanism, Parameter, Plant, Seed, Simulator};
 
 /// A twin whose parameters are drawn.
 #[derive(Debug, Clone)]
@@ -25,6 +25,36 @@ pub struct RandomizedTwin<P: Plant> {
     pub added: Vec<&'static str>,
     /// What a reader should know, a sentence each.
     pub notes: Vec<String>,
+}
+
+impl<P: Plant> RandomizedTwin<P> {
+    /// Holds every parameter to be drawn once for a run: one that is drawn anew within needs an environment, which goes on from
+    /// where it is.
+    ///
+    /// # Errors
+    /// A parameter that is drawn every so often, or with a regime.
+    pub fn check_drawn_once(&self, document: &Document) -> Result<(), InputError> {
+        let within = |one: &&Randomized| !matches!(one.at, Redraw::Startup | Redraw::Reset);
+        match self.randomizer.randomized().iter().find(within) {
+            None => Ok(()),
+            Some(one) => {
+                let message = format!("`{}` is drawn anew within a run, which takes an environment", one.target);
+                Err(document.error(&["randomize"], message).hint("say at = \"reset\": a value a run"))
+            }
+        }
+    }
+
+    /// The values of all of the assembly's parameters, a list each of `draws` draws.
+    #[must_use]
+    pub fn draw(&self, seed: Seed, draws: usize) -> (DrawTable, Vec<Vec<f64>>) {
+        let table = self.randomizer.begin(seed, 0, draws, 0, self.level);
+        let nominal: Vec<f64> = self.assembly.parameters().iter().map(|p| p.nominal).collect();
+        let mut lanes = vec![nominal; draws];
+        for (k, place) in self.places.iter().enumerate() {
+            lanes.iter_mut().zip(table.row(k)).for_each(|(lane, value)| lane[*place] = *value);
+        }
+        (table, lanes)
+    }
 }
 
 /// Where what is wanted of a parameter comes from.
@@ -169,6 +199,10 @@ impl<P: Plant> Resolving<'_, P> {
         let targets = self.wanted.targets.clone();
         for (target, origin) in &targets {
             let Some(id) = target.mechanism.as_deref() else { continue };
+            // A factor of what does nothing does nothing either.
+            if matches!(origin, Origin::Preset(number, row) if self.wanted.presets[*number].rows[*row].relative) {
+                continue;
+            }
             if self.assembly.mechanisms().any(|(row, ..)| row.about().name == id) {
                 continue;
             }
@@ -243,9 +277,8 @@ impl<P: Plant> Resolving<'_, P> {
         let (mut all, mut origins, mut places) = (Vec::new(), Vec::new(), Vec::new());
         for (target, origin) in targets {
             let Some(place) = known.iter().position(|other| *other == target) else {
-                if let Origin::Preset(number, _) = origin {
-                    let name = self.wanted.presets[number].name;
-                    self.notes.push(format!("the preset `{name}` has `{target}`, which this twin has not"));
+                // A preset is of more than one twin has.
+                if matches!(origin, Origin::Preset(..)) {
                     continue;
                 }
                 return Err(self.unknown(&known, &target, origin));
