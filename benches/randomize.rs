@@ -4,9 +4,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use trueup::sim2real::randomize::{
-    Correlation, Distribution, Level, Occasion, Randomized, Randomizer, Redraw, Target,
-};
+use trueup::sim2real::randomize::{Correlation, Distribution, Level, Occasion, Randomized, Randomizer, Redraw, Target};
 use trueup::sim2real::{Parameter, Seed};
 
 const PARAMETERS: usize = 20;

@@ -240,7 +240,8 @@ fn random<P: Plant>(twin: &RandomizedTwin<P>) -> Option<String> {
         })
         .collect();
     let names = silent.join("`, `");
-    (!silent.is_empty()).then(|| format!("`{names}` draws by itself and is left out of what is followed: the noise floor stands for it"))
+    (!silent.is_empty())
+        .then(|| format!("`{names}` draws by itself and is left out of what is followed: the noise floor stands for it"))
 }
 
 /// What came of it, in a sentence or two.

@@ -328,7 +328,10 @@ mod tests {
         twin.toml:15:6: expected when it is drawn, found "never"
           hint: at = "startup", "reset", { seconds = 0.5 }, { steps = 100 } or { regime = 1 }
         "#);
-        assert!(one("distribution = \"uniform\"\nlow = 1.0\nhigh = 2.0\nat = { seconds = 1.0, steps = 2 }\n").contains("one of `seconds`"));
+        assert!(
+            one("distribution = \"uniform\"\nlow = 1.0\nhigh = 2.0\nat = { seconds = 1.0, steps = 2 }\n")
+                .contains("one of `seconds`")
+        );
     }
 
     #[test]

@@ -120,8 +120,8 @@ pub fn randomized_twin<P: Plant>(
     let (randomized, origins, places) = out.randomized(at)?;
     let correlations = out.correlations(section, &randomized, &origins);
     let Resolving { wanted, assembly, added, mut notes, .. } = out;
-    let randomizer = Randomizer::new(randomized, correlations)
-        .map_err(|error| explained(document, &wanted, &origins, &error))?;
+    let randomizer =
+        Randomizer::new(randomized, correlations).map_err(|error| explained(document, &wanted, &origins, &error))?;
     notes.extend(randomizer.oddities());
     let level = section.map_or(Level::FULL, |section| section.level);
     Ok(RandomizedTwin { assembly, randomizer, level, places, added, notes })
@@ -253,7 +253,8 @@ impl<P: Plant> Resolving<'_, P> {
                     .iter()
                     .map(|form| form.parameters.iter().map(|p| format!("`{}`", p.name)).collect::<Vec<_>>().join(" and "))
                     .collect();
-                error(format!("no form of `{id}` has all of `{}`", asked.join("`, `"))).hint(format!("it has {}", ways.join(", or ")))
+                error(format!("no form of `{id}` has all of `{}`", asked.join("`, `")))
+                    .hint(format!("it has {}", ways.join(", or ")))
             }
             None => error(format!("`{target}` has nothing to act on: the twin does not say what moves"))
                 .hint("say it in a section `[attach]`"),
@@ -263,9 +264,10 @@ impl<P: Plant> Resolving<'_, P> {
     /// The assembly's parameters by name, in their order.
     fn known(&self) -> Vec<Target> {
         let own = self.assembly.own().iter().map(|p| Target::own(&p.name));
-        let added = self.assembly.mechanisms().flat_map(|(row, _, parameters)| {
-            parameters.iter().map(move |p| Target::of(row.about().name, &p.name))
-        });
+        let added = self
+            .assembly
+            .mechanisms()
+            .flat_map(|(row, _, parameters)| parameters.iter().map(move |p| Target::of(row.about().name, &p.name)));
         own.chain(added).collect()
     }
 
@@ -294,7 +296,8 @@ impl<P: Plant> Resolving<'_, P> {
             places.push(place);
         }
         if all.is_empty() {
-            let error = self.document.error(&["randomize"], "there is nothing to randomize: no preset has a parameter of this twin");
+            let error =
+                self.document.error(&["randomize"], "there is nothing to randomize: no preset has a parameter of this twin");
             return Err(error.hint("add [[randomize.parameter]]"));
         }
         Ok((all, origins, places))
@@ -345,11 +348,8 @@ impl<P: Plant> Resolving<'_, P> {
     }
 
     fn unknown(&self, known: &[Target], target: &Target, origin: Origin) -> InputError {
-        let alike: Vec<String> = known
-            .iter()
-            .filter(|other| other.mechanism == target.mechanism)
-            .map(|other| other.parameter.clone())
-            .collect();
+        let alike: Vec<String> =
+            known.iter().filter(|other| other.mechanism == target.mechanism).map(|other| other.parameter.clone()).collect();
         let holder = match &target.mechanism {
             Some(id) => format!("`{id}`, as the twin lists it,"),
             None => format!("the model `{}`", self.assembly.name()),
@@ -379,13 +379,17 @@ impl<P: Plant> Resolving<'_, P> {
         let told = self.wanted.posterior.map_or_else(Vec::new, Posterior::correlations);
         all.extend(told.into_iter().filter(|pair| pair.between.iter().all(|target| drawn(target).is_some())));
         let replaced = self.wanted.posterior.map_or(0, |posterior| {
-            let own = |k: &usize| randomized.iter().zip(origins).any(|(one, origin)| {
-                one.target == posterior.target(*k) && matches!(origin, Origin::Entry(_))
-            });
+            let own = |k: &usize| {
+                randomized
+                    .iter()
+                    .zip(origins)
+                    .any(|(one, origin)| one.target == posterior.target(*k) && matches!(origin, Origin::Entry(_)))
+            };
             (0..posterior.names.len()).filter(own).count()
         });
         if replaced > 0 {
-            self.notes.push(format!("{replaced} of the posterior's parameters are drawn as [[randomize.parameter]] says instead"));
+            self.notes
+                .push(format!("{replaced} of the posterior's parameters are drawn as [[randomize.parameter]] says instead"));
         }
         all
     }
@@ -396,7 +400,9 @@ fn explained(document: &Document, wanted: &Wanted<'_>, origins: &[Origin], error
     let words = error.to_string();
     let (message, hint) = words.split_once("\nhint: ").unwrap_or((&words, ""));
     let error = match error {
-        RandomizeError::Parameter { index, .. } => wanted.error(document, origins[*index], "distribution", message.to_owned()),
+        RandomizeError::Parameter { index, .. } => {
+            wanted.error(document, origins[*index], "distribution", message.to_owned())
+        }
         RandomizeError::Twice { index, .. } => wanted.error(document, origins[*index], "parameter", message.to_owned()),
         RandomizeError::Correlation(_) => document.error(&["randomize", "correlation"], message),
     };
@@ -459,7 +465,9 @@ mod tests {
                    std = [0.001, 0.002, 0.003]\ncorrelation = [[0.5], [0.1, 0.2]]\n";
         let twin = resolved(own).unwrap();
         assert_eq!((twin.places, twin.randomizer.correlations().len()), (vec![0, 1, 4], 3));
-        assert!(matches!(resolved("").unwrap_err().to_string(), text if text.contains("neither [randomize] nor [posterior]")));
+        assert!(
+            matches!(resolved("").unwrap_err().to_string(), text if text.contains("neither [randomize] nor [posterior]"))
+        );
     }
 
     #[test]
@@ -474,7 +482,9 @@ mod tests {
     #[test]
     fn what_is_not_there_is_refused_with_what_may_be_meant() {
         let one = |mechanism: &str, parameter: &str, rest: &str| {
-            let text = format!("[[randomize.parameter]]\n{mechanism}parameter = \"{parameter}\"\ndistribution = \"uniform\"\n{rest}");
+            let text = format!(
+                "[[randomize.parameter]]\n{mechanism}parameter = \"{parameter}\"\ndistribution = \"uniform\"\n{rest}"
+            );
             resolved(&text).unwrap_err().to_string()
         };
         let range = "low = 0.05\nhigh = 0.3\n";

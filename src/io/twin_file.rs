@@ -12,8 +12,8 @@ use super::equation_sections::{AttachEntry, EquationSections, InputEntry, Named,
 use super::error::InputError;
 use super::instrument_entry::{InstrumentEntry, check_instruments, check_no_terms};
 use super::market_files::{MarketFiles, MarketTable, market_files, market_keys};
-use super::quantity::{MechanismEntry, Quantity, check_mechanisms};
 use super::posterior_section::{check_posterior, posterior_keys};
+use super::quantity::{MechanismEntry, Quantity, check_mechanisms};
 use super::randomize_section::{RandomizeSection, RandomizeTable};
 use super::run_file::RunFile;
 use super::toml_text::{float, section, short_form, table_form, text};

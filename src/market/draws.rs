@@ -118,7 +118,10 @@ impl PreparedRun {
         run_needs::check(run, &twin.assembly, self.backtest.instruments(), self.backtest.histories())?;
         if settings.reference.is_none() && Reference::suiting(&twin.assembly) != Reference::suiting(venue) {
             let id = twin.added.iter().find(|id| ["half_spread", "book_walk"].contains(*id)).unwrap_or(&"half_spread");
-            let error = run.error(&["randomize"], format!("with `{id}` orders meet the mid, and in the run as it is written the touch"));
+            let error = run.error(
+                &["randomize"],
+                format!("with `{id}` orders meet the mid, and in the run as it is written the touch"),
+            );
             return Err(error.hint(format!("add [[mechanism]] name = \"{id}\" with its nominal value, or price in [run]")));
         }
         let (drawn, lanes) = twin.draw(seed, draws);

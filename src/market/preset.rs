@@ -33,12 +33,7 @@ pub fn presets() -> Vec<Preset> {
             factor("command_delay", "seconds", unsaid(), HOUSE),
             factor("linear_impact", "bps_at_full_participation", unsaid(), HOUSE),
             factor("volatility_slippage", "fraction", unsaid(), HOUSE),
-            factor(
-                "sqrt_impact",
-                "bps_at_full_participation",
-                Distribution::LogUniform { low: 0.5, high: 2.0 },
-                TOTH,
-            ),
+            factor("sqrt_impact", "bps_at_full_participation", Distribution::LogUniform { low: 0.5, high: 2.0 }, TOTH),
             factor(
                 "permanent_impact",
                 "bps_at_full_participation",

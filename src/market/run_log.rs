@@ -8,8 +8,8 @@ use serde::{Serialize, Serializer};
 use crate::io::{InputError, OutputFolder, OutputTable};
 use crate::report::{BacktestPage, ReportError};
 
-use super::metric::{Counts, CurrencySummary, InstrumentSummary, Metrics, RoundTrip};
 use super::draws::{DrawsSummary, RunDraws};
+use super::metric::{Counts, CurrencySummary, InstrumentSummary, Metrics, RoundTrip};
 use super::run_page::run_page;
 use super::{Backtest, DataSummary, HaltSummary, Instrument, MoneyError, Price, Record, Reference};
 

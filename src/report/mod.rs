@@ -19,7 +19,9 @@ mod section;
 mod sections;
 mod sweep;
 
-pub use backtest::{BacktestPage, Cost, DrawsPart, Exposure, Fall, FigureGroup, Fill, InForce, Input, Metric, MonthReturn, Trade};
+pub use backtest::{
+    BacktestPage, Cost, DrawsPart, Exposure, Fall, FigureGroup, Fill, InForce, Input, Metric, MonthReturn, Trade,
+};
 pub use diagnosis::diagnosis_page;
 pub use fan::{Fan, FanBand, FanTime};
 pub use figures::{Abscissa, DiagnosisFigures, Trace};

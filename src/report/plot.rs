@@ -6,8 +6,8 @@
 mod svg;
 
 use chrono::DateTime;
-use kuva::plot::scatter::ScatterPlot;
 use kuva::plot::band::BandPlot;
+use kuva::plot::scatter::ScatterPlot;
 use kuva::plot::{LinePlot, LineStyle};
 use kuva::render::annotations::{ReferenceLine, ShadedRegion, TextAnnotation};
 use kuva::render::datetime::{DateTimeAxis, DateUnit};

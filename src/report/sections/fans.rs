@@ -119,9 +119,7 @@ mod tests {
             quantity: ("position".into(), "rad".into()),
             time: FanTime::Seconds(time.clone()),
             median: level(0.0),
-            bands: [0.5, 0.95]
-                .map(|part| FanBand { part, low: level(-part), high: level(part) })
-                .to_vec(),
+            bands: [0.5, 0.95].map(|part| FanBand { part, low: level(-part), high: level(part) }).to_vec(),
             nominal: level(0.2),
             measured: Some((time, vec![Some(0.1); 50])),
         };

@@ -95,7 +95,9 @@ pub enum AdrError {
         hint: &'static str,
     },
     /// A range that cannot be.
-    #[error("the range of `{name}` cannot be: from {from}, within {low} to {high}, in steps of {step}\nhint: it begins within its limits and widens in steps above 0")]
+    #[error(
+        "the range of `{name}` cannot be: from {from}, within {low} to {high}, in steps of {step}\nhint: it begins within its limits and widens in steps above 0"
+    )]
     Range {
         /// The parameter.
         name: String,

@@ -17,7 +17,9 @@ pub struct Correlation {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CorrelationError {
     /// A coefficient that is none.
-    #[error("expected a correlation of `{first}` and `{second}` between -1 and 1, found {found}\nhint: neither end can be: two that always go together are one")]
+    #[error(
+        "expected a correlation of `{first}` and `{second}` between -1 and 1, found {found}\nhint: neither end can be: two that always go together are one"
+    )]
     Coefficient {
         /// The one.
         first: String,

@@ -118,7 +118,9 @@ pub enum DistributionError {
         weights: usize,
     },
     /// Weights that cannot be.
-    #[error("expected weights that are not negative and not all 0, found {found}\nhint: a value that is never drawn can be left out")]
+    #[error(
+        "expected weights that are not negative and not all 0, found {found}\nhint: a value that is never drawn can be left out"
+    )]
     Weight {
         /// The weight, or the sum.
         found: f64,
@@ -220,7 +222,9 @@ impl Distribution {
     pub fn support(&self) -> [f64; 2] {
         match self {
             Self::Constant { value } => [*value, *value],
-            Self::Uniform { low, high } | Self::LogUniform { low, high } | Self::TruncatedNormal { low, high, .. } => [*low, *high],
+            Self::Uniform { low, high } | Self::LogUniform { low, high } | Self::TruncatedNormal { low, high, .. } => {
+                [*low, *high]
+            }
             Self::Normal { mean, std } => [mean - Self::REACH * std, mean + Self::REACH * std],
             Self::LogNormal { median, sigma } => {
                 let factor = (Self::REACH * sigma).exp();
@@ -293,7 +297,8 @@ impl Inverse {
             Self::TruncatedNormal { mean, std, low, high, below, within } => {
                 // Far up the tail, parts are told from above: they are too near to 1 to be told from below.
                 let part = below + u * within;
-                let z = if *below > 0.5 { -normal_quantile(upper(*mean, *std, *low, *high, u)) } else { normal_quantile(part) };
+                let z =
+                    if *below > 0.5 { -normal_quantile(upper(*mean, *std, *low, *high, u)) } else { normal_quantile(part) };
                 (mean + std * z).clamp(*low, *high)
             }
             Self::LogNormal { mean, sigma } => (mean + sigma * normal_quantile(u)).exp(),
@@ -311,7 +316,9 @@ impl Inverse {
             Self::Normal { mean, std } => mean + std * z,
             Self::LogNormal { mean, sigma } => (mean + sigma * z).exp(),
             // Nothing is cut off.
-            Self::TruncatedNormal { mean, std, low, high, within, .. } if *within >= 1.0 => (mean + std * z).clamp(*low, *high),
+            Self::TruncatedNormal { mean, std, low, high, within, .. } if *within >= 1.0 => {
+                (mean + std * z).clamp(*low, *high)
+            }
             other => other.at(normal_cdf(z).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)),
         }
     }
@@ -341,11 +348,7 @@ mod tests {
             (Distribution::LogUniform { low: a, high: b }, m, (square - m * m).sqrt()),
             (Distribution::Normal { mean: 2.0, std: 0.5 }, 2.0, 0.5),
             (truncated, half, (1.0 - half * half).sqrt()),
-            (
-                Distribution::LogNormal { median: 1.0, sigma: 0.2 },
-                (s2 / 2.0).exp(),
-                ((s2.exp() - 1.0) * s2.exp()).sqrt(),
-            ),
+            (Distribution::LogNormal { median: 1.0, sigma: 0.2 }, (s2 / 2.0).exp(), ((s2.exp() - 1.0) * s2.exp()).sqrt()),
             (Distribution::Choice { values: vec![0.0, 10.0], weights: vec![3.0, 1.0] }, 2.5, 10.0 * (3.0_f64 / 16.0).sqrt()),
             (Distribution::Choice { values: vec![1.0, 2.0, 3.0], weights: vec![] }, 2.0, (2.0_f64 / 3.0).sqrt()),
         ]

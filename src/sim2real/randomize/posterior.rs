@@ -35,7 +35,9 @@ pub enum PosteriorError {
         found: usize,
     },
     /// A row of the triangle that is not as long as its number.
-    #[error("expected {row} correlations in row {row}, found {found}\nhint: the n-th row has those of parameter n + 1 with the n before it")]
+    #[error(
+        "expected {row} correlations in row {row}, found {found}\nhint: the n-th row has those of parameter n + 1 with the n before it"
+    )]
     Row {
         /// Which row, from 1.
         row: usize,
@@ -187,7 +189,8 @@ mod tests {
     #[test]
     fn draws_have_the_covariance_and_stay_within_bounds() {
         let posterior = posterior();
-        let bounds = [Parameter::new("inertia", "", 1.0).within(0.01, 100.0), Parameter::new("torque", "", 0.5).within(0.3, 9.0)];
+        let bounds =
+            [Parameter::new("inertia", "", 1.0).within(0.01, 100.0), Parameter::new("torque", "", 0.5).within(0.3, 9.0)];
         let randomized =
             bounds.into_iter().enumerate().map(|(k, parameter)| posterior.randomized(k, parameter, Redraw::Reset)).collect();
         let randomizer = Randomizer::new(randomized, posterior.correlations()).unwrap();

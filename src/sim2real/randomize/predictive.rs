@@ -82,8 +82,7 @@ fn below(value: f64, draws: &[f64], noise: f64) -> f64 {
 }
 
 fn quantile(part: f64, draws: &[f64], noise: f64) -> f64 {
-    let (mut low, mut high) =
-        draws.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (mut low, mut high) = draws.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     (low, high) = (low - 4.0 * noise, high + 4.0 * noise);
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
@@ -127,8 +126,7 @@ impl Predicted {
         if measured.is_empty() || self.draws.is_empty() {
             return None;
         }
-        let parts: Vec<f64> =
-            measured.par_iter().map(|(row, sample)| below(*sample, &self.at(*row), self.noise)).collect();
+        let parts: Vec<f64> = measured.par_iter().map(|(row, sample)| below(*sample, &self.at(*row), self.noise)).collect();
         let holds = |band: f64, part: f64| (part - 0.5).abs() <= 0.5 * band;
         let share = |band: f64| parts.iter().filter(|part| holds(band, **part)).count() as f64 / parts.len() as f64;
         let within = BANDS.iter().chain([&WIDEST]).map(|band| BandShare { band: *band, share: share(*band) }).collect();
@@ -217,7 +215,10 @@ mod tests {
             let std = (0.1 * height).hypot(0.05);
             for (band, ends) in BANDS.iter().zip(&bands.ends) {
                 let expected = std * normal_quantile(0.5 + 0.5 * band);
-                assert!((ends[1][k] - height - expected).abs() < 0.02 * std && (height - expected - ends[0][k]).abs() < 0.02 * std);
+                assert!(
+                    (ends[1][k] - height - expected).abs() < 0.02 * std
+                        && (height - expected - ends[0][k]).abs() < 0.02 * std
+                );
             }
             assert!((bands.median[k] - height).abs() < 1e-3);
         }

@@ -91,7 +91,11 @@ fn the_level_goes_from_nominal_to_full_without_a_jump_or_a_step_back() {
             for ((now, before), full) in now.row(k).iter().zip(&before).zip(full.row(k)) {
                 // Its distance from what is drawn shrinks at every step, and by no more than a few hundredths.
                 let left = |value: f64| if value.is_infinite() { f64::INFINITY } else { (full - value).abs() };
-                assert!(left(*now) <= left(*before), "{:?} at {step}: {before} {now} {full}", randomizer.randomized[k].target);
+                assert!(
+                    left(*now) <= left(*before),
+                    "{:?} at {step}: {before} {now} {full}",
+                    randomizer.randomized[k].target
+                );
                 if before.is_finite() && entry.nominal.is_finite() {
                     assert!((now - before).abs() <= 0.05 * (full - entry.nominal).abs() + 1e-12);
                 }

@@ -91,7 +91,9 @@ pub enum Implausible {
     #[error(transparent)]
     Distribution(#[from] DistributionError),
     /// A factor of nothing.
-    #[error("a factor of the nominal value {nominal} changes nothing\nhint: give the range in the parameter's unit, without `relative`")]
+    #[error(
+        "a factor of the nominal value {nominal} changes nothing\nhint: give the range in the parameter's unit, without `relative`"
+    )]
     NothingToScale {
         /// The nominal value.
         nominal: f64,
@@ -111,7 +113,9 @@ pub enum Implausible {
         hint: &'static str,
     },
     /// A mass below nothing.
-    #[error("draws as low as {low} make no sense: {what} is {must}\nhint: draw from a range above 0, or by factors with relative = true")]
+    #[error(
+        "draws as low as {low} make no sense: {what} is {must}\nhint: draw from a range above 0, or by factors with relative = true"
+    )]
     Unphysical {
         /// The least value that can be drawn.
         low: f64,
@@ -121,7 +125,9 @@ pub enum Implausible {
         must: &'static str,
     },
     /// A time between draws that is none.
-    #[error("expected a time between draws above 0, found {found}\nhint: at = {{ seconds = 0.5 }} or at = {{ steps = 100 }}")]
+    #[error(
+        "expected a time between draws above 0, found {found}\nhint: at = {{ seconds = 0.5 }} or at = {{ steps = 100 }}"
+    )]
     Interval {
         /// What was found.
         found: f64,
@@ -130,12 +136,8 @@ pub enum Implausible {
 
 /// Words in names of parameters that cannot be below 0, or not even 0, whatever the bounds are: the parameters of equations
 /// have none.
-const SIGNED: [(&str, &str, bool); 4] = [
-    ("mass", "a mass", true),
-    ("inertia", "an inertia", true),
-    ("length", "a length", true),
-    ("gravity", "gravity", false),
-];
+const SIGNED: [(&str, &str, bool); 4] =
+    [("mass", "a mass", true), ("inertia", "an inertia", true), ("length", "a length", true), ("gravity", "gravity", false)];
 
 impl Randomized {
     /// The least and the largest value that can be drawn, in the parameter's unit.
@@ -200,7 +202,8 @@ impl Randomized {
             });
         }
         let outside = nominal.is_finite() && !(low..=high).contains(&nominal);
-        outside.then(|| format!("the nominal value {nominal} of `{}` lies outside what is drawn, {low} to {high}", self.target))
+        outside
+            .then(|| format!("the nominal value {nominal} of `{}` lies outside what is drawn, {low} to {high}", self.target))
     }
 }
 
@@ -258,7 +261,8 @@ mod tests {
         let parameter = || Parameter::new("torque", "N m", 0.1);
         assert_eq!(uniform(parameter(), 0.0, 1.0).oddity(), None);
         assert!(uniform(parameter(), 0.2, 1.0).oddity().unwrap().contains("lies outside"));
-        let constant = |value| Randomized { distribution: Distribution::Constant { value }, ..uniform(parameter(), 0.0, 1.0) };
+        let constant =
+            |value| Randomized { distribution: Distribution::Constant { value }, ..uniform(parameter(), 0.0, 1.0) };
         assert!(constant(0.1).oddity().unwrap().contains("nothing is randomized"));
         assert!(constant(0.2).oddity().unwrap().contains("no width"));
     }
