@@ -188,7 +188,7 @@ mod tests {
     /// Draws of a wave whose height is uncertain by `spread`, and a measurement of one of height `truth`.
     fn predicted(spread: f64, truth: f64, noise: f64) -> Predicted {
         let mut rng = Seed(5).stream("predictive");
-        let mut normal = || StandardNormal.sample(&mut rng);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let time: Vec<f64> = (0..2_000).map(|k| f64::from(k) * 0.01).collect();
         let wave = |height: f64| time.iter().map(|t| height * (1.5 + t.sin())).collect::<Vec<f64>>();
         let heights: Vec<f64> = (0..200).map(|k| 1.0 + spread * normal_quantile((f64::from(k) + 0.5) / 200.0)).collect();
