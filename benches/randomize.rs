@@ -4,6 +4,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use rand::RngExt as _;
 use trueup::sim2real::randomize::{Correlation, Distribution, Level, Occasion, Randomized, Randomizer, Redraw, Target};
 use trueup::sim2real::{Parameter, Seed};
 
@@ -55,6 +56,17 @@ fn draws(criterion: &mut Criterion) {
             });
         }
     }
+    // What a generator with a state would cost, one for each environment.
+    group.bench_function("uniform_by_a_named_stream_an_environment", |bencher| {
+        let mut values = vec![0.0; PARAMETERS * ENVIRONMENTS];
+        bencher.iter(|| {
+            for environment in 0..ENVIRONMENTS {
+                let mut stream = Seed(7).stream(&format!("environment {environment}"));
+                (0..PARAMETERS).for_each(|k| values[k * ENVIRONMENTS + environment] = stream.random_range(0.8..1.2));
+            }
+            black_box(values[0])
+        });
+    });
     group.finish();
 }
 

@@ -118,7 +118,7 @@ mechanism = 'command_delay'
 parameter = 'seconds'
 distribution = 'uniform'
 low = 0.0
-high = 180.0
+high = 60.0
 [[randomize.correlation]]
 between = ['half_spread.bps', 'command_delay.seconds']
 coefficient = 0.5
