@@ -323,8 +323,11 @@ fn told(screen: &Screen, rolled: &Rolled, coverage: &[Coverage], summary: &str) 
     }
     text += &titled("Samples within each band", &screen.listing(&coverage_listing(coverage)));
     text += &titled("What was drawn", &screen.listing(&parameters_listing(rolled)));
-    for note in about(rolled).iter().chain(&rolled.notes) {
-        text += &format!("\n{}\n", screen.wrapped("", note));
+    for note in about(rolled) {
+        text += &format!("\n{}\n", screen.wrapped("", &note));
+    }
+    for note in &rolled.notes {
+        text += &format!("{}\n", screen.wrapped("- ", &format!("{note}.")));
     }
     text
 }

@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(section.parameters[0].at, Redraw::EverySeconds(0.5));
         assert_eq!((section.parameters[1].at, section.parameters[1].relative), (Redraw::Startup, true));
         assert_eq!(section.correlations[0].between[0], Target::of("coulomb_friction", "torque"));
-        let again = TwinFile::parse(Document::from_text("twin.toml", file.render(Path::new("")).unwrap())).unwrap();
+        let again = TwinFile::parse(Document::from_text("twin.toml", file.render(Path::new(".")).unwrap())).unwrap();
         assert_eq!(again.randomize.unwrap(), *section);
     }
 

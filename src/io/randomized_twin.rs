@@ -326,7 +326,7 @@ impl<P: Plant> Resolving<'_, P> {
             Origin::Preset(number, row) => {
                 let preset = self.wanted.presets[number];
                 let row = &preset.rows[row];
-                let skipped = |why: String| format!("the preset `{}` leaves out `{target}`: {why}", preset.name);
+                let skipped = |why: String| format!("The preset `{}` leaves out `{target}`: {why}", preset.name);
                 let whole = Randomized {
                     target: target.clone(),
                     parameter: parameter.clone(),

@@ -1,6 +1,6 @@
 //! Draws of a run as its report and the terminal show them.
 
-use crate::report::quantity::{UNDEFINED, number, percent};
+use crate::report::quantity::{UNDEFINED, fine, number};
 use crate::report::{BacktestPage, DrawsPart, Fan, FanBand, FanTime, Listing};
 use crate::sim2real::randomize::{BANDS, quantiles};
 
@@ -13,7 +13,7 @@ const FIGURES: [&str; 12] = [
     "cagr",
     "sharpe",
     "sortino",
-    "volatility",
+    "annualised_volatility",
     "max_drawdown.depth",
     "turnover",
     "hit_rate",
@@ -22,12 +22,20 @@ const FIGURES: [&str; 12] = [
     "costs.fees",
 ];
 
+/// Which of the quantiles tables have: all are in `run.json`.
+const TOLD: [usize; 5] = [0, 2, 3, 4, 6];
+
 /// The parts of all draws in heads of tables.
 fn heads() -> impl Iterator<Item = String> {
-    PARTS.iter().map(|part| match part {
+    TOLD.iter().map(|k| match PARTS[*k] {
         0.5 => "median".to_owned(),
         part => format!("{} %", 100.0 * part),
     })
+}
+
+/// The quantiles that tables have.
+fn cells(quantiles: &[f64]) -> impl Iterator<Item = String> {
+    TOLD.iter().filter_map(|k| quantiles.get(*k)).map(|value| number(*value))
 }
 
 impl DrawsSummary {
@@ -37,8 +45,7 @@ impl DrawsSummary {
         let row = |name: &&str| {
             let figure = self.figures.get(*name)?;
             let nominal = figure.nominal.map_or_else(|| UNDEFINED.to_owned(), number);
-            let cells = figure.quantiles.iter().map(|value| number(*value));
-            Some([(*name).to_owned(), nominal].into_iter().chain(cells).collect())
+            Some([(*name).to_owned(), nominal].into_iter().chain(cells(&figure.quantiles)).collect())
         };
         let heads = ["figure".to_owned(), "nominal".to_owned()].into_iter().chain(heads()).collect();
         Listing { heads, rows: FIGURES.iter().filter_map(row).collect() }
@@ -50,7 +57,7 @@ impl DrawsSummary {
         let rows = self.drawn.iter().map(|(name, drawn)| {
             let nominal = drawn.nominal.map_or_else(|| "\u{221e}".to_owned(), number);
             let head = [name.clone(), drawn.unit.clone(), drawn.distribution.to_owned(), nominal];
-            head.into_iter().chain(drawn.quantiles.iter().map(|value| number(*value))).collect()
+            head.into_iter().chain(cells(&drawn.quantiles)).collect()
         });
         let heads = ["parameter", "unit", "distribution", "nominal"].map(str::to_owned).into_iter().chain(heads());
         Listing { heads: heads.collect(), rows: rows.collect() }
@@ -73,9 +80,9 @@ impl DrawsSummary {
             let [least, .., most] = gained.quantiles.as_slice() else { return said };
             said.push(format!(
                 "95 % of all draws return between {} and {}; the run as it is written returns {}.",
-                percent(*least),
-                percent(*most),
-                percent(nominal)
+                fine(*least),
+                fine(*most),
+                fine(nominal)
             ));
         }
         said.extend(self.notes.iter().map(|note| format!("{note}.")));

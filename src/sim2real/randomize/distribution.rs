@@ -254,7 +254,9 @@ impl Distribution {
             Self::TruncatedNormal { mean, std, low, high } => {
                 let below = normal_cdf((low - mean) / std);
                 let within = normal_cdf((high - mean) / std) - below;
-                Inverse::TruncatedNormal { mean: *mean, std: *std, low: *low, high: *high, below, within }
+                let beyond = normal_cdf(-(high - mean) / std);
+                let above = [beyond, normal_cdf(-(low - mean) / std) - beyond];
+                Inverse::TruncatedNormal { mean: *mean, std: *std, low: *low, high: *high, below, within, above }
             }
             Self::LogNormal { median, sigma } => Inverse::LogNormal { mean: median.ln(), sigma: *sigma },
             Self::Choice { values, weights } => {
@@ -276,12 +278,38 @@ impl Distribution {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Inverse {
     Constant(f64),
-    Uniform { low: f64, high: f64 },
-    LogUniform { low: f64, high: f64, from: f64, width: f64 },
-    Normal { mean: f64, std: f64 },
-    TruncatedNormal { mean: f64, std: f64, low: f64, high: f64, below: f64, within: f64 },
-    LogNormal { mean: f64, sigma: f64 },
-    Choice { values: Vec<f64>, cumulative: Vec<f64> },
+    Uniform {
+        low: f64,
+        high: f64,
+    },
+    LogUniform {
+        low: f64,
+        high: f64,
+        from: f64,
+        width: f64,
+    },
+    Normal {
+        mean: f64,
+        std: f64,
+    },
+    /// With the part below the lower end, the part within, and the part above the upper end and that within told from above.
+    TruncatedNormal {
+        mean: f64,
+        std: f64,
+        low: f64,
+        high: f64,
+        below: f64,
+        within: f64,
+        above: [f64; 2],
+    },
+    LogNormal {
+        mean: f64,
+        sigma: f64,
+    },
+    Choice {
+        values: Vec<f64>,
+        cumulative: Vec<f64>,
+    },
 }
 
 impl Inverse {
@@ -294,11 +322,11 @@ impl Inverse {
             Self::Uniform { low, high } => (low + u * (high - low)).clamp(*low, *high),
             Self::LogUniform { low, high, from, width } => (from + u * width).exp().clamp(*low, *high),
             Self::Normal { mean, std } => mean + std * normal_quantile(u),
-            Self::TruncatedNormal { mean, std, low, high, below, within } => {
-                // Far up the tail, parts are told from above: they are too near to 1 to be told from below.
+            Self::TruncatedNormal { mean, std, low, high, below, within, above } => {
+                // Parts near to 1 are told from above: there are no more digits to tell them from below.
                 let part = below + u * within;
-                let z =
-                    if *below > 0.5 { -normal_quantile(upper(*mean, *std, *low, *high, u)) } else { normal_quantile(part) };
+                let [beyond, between] = *above;
+                let z = if part <= 0.5 { normal_quantile(part) } else { -normal_quantile(beyond + (1.0 - u) * between) };
                 (mean + std * z).clamp(*low, *high)
             }
             Self::LogNormal { mean, sigma } => (mean + sigma * normal_quantile(u)).exp(),
@@ -322,12 +350,6 @@ impl Inverse {
             other => other.at(normal_cdf(z).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)),
         }
     }
-}
-
-/// The part of a Gaussian above the value that a part `u` of what lies between the ends is below.
-fn upper(mean: f64, std: f64, low: f64, high: f64, u: f64) -> f64 {
-    let above = |end: f64| normal_cdf(-(end - mean) / std);
-    above(low) + u * (above(high) - above(low))
 }
 
 #[cfg(test)]

@@ -203,7 +203,7 @@ impl Randomized {
         }
         let outside = nominal.is_finite() && !(low..=high).contains(&nominal);
         outside
-            .then(|| format!("the nominal value {nominal} of `{}` lies outside what is drawn, {low} to {high}", self.target))
+            .then(|| format!("The nominal value {nominal} of `{}` lies outside what is drawn, {low} to {high}", self.target))
     }
 }
 
