@@ -75,7 +75,7 @@ fn draws_that_exclude_the_truth_are_detected_and_said() {
     assert!(out.starts_with("The draws do not cover the recording: "), "{out}");
     let said = out.replace('\n', " ");
     assert!(
-        said.contains("lie outside the 99.0\u{a0}% band, first at t = ") && said.contains("hint: what was recorded"),
+        said.contains("lie outside the 99\u{a0}% band, first at t = ") && said.contains("hint: what was recorded"),
         "{out}"
     );
     for file in ["rollout.json", "draws.parquet", "bands.parquet", "report.html"] {

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use crate::io::{InputError, OutputFolder, OutputTable, Overwrite, RandomizedTwin, TwinFile, hint_among, randomized_twin};
-use crate::report::quantity::{axis, number, percent};
+use crate::report::quantity::{axis, number, percent, significant, whole_percent};
 use crate::report::{Badge, Fan, FanBand, FanTime, Listing, RolloutPage, Tone};
 use crate::robot::{
     cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
@@ -255,13 +255,13 @@ fn summary(coverage: &[Coverage], draws: u32) -> String {
                 percent(worst.outside),
                 worst.channel,
                 worst.recording,
-                percent(WIDEST)
+                whole_percent(WIDEST)
             )
         }
         Some(worst) => format!(
             "The {draws} draws cover the recording: at most {} of the samples of a channel lie outside the {} band.",
             percent(worst.outside),
-            percent(WIDEST)
+            whole_percent(WIDEST)
         ),
         None => String::new(),
     }
@@ -278,7 +278,7 @@ fn hint(coverage: &[Coverage]) -> Option<String> {
 }
 
 fn coverage_listing(coverage: &[Coverage]) -> Listing {
-    let bands = BANDS.iter().chain([&WIDEST]).map(|band| format!("in {}", percent(*band)));
+    let bands = BANDS.iter().chain([&WIDEST]).map(|band| format!("in {}", whole_percent(*band)));
     let heads = ["recording", "channel", "samples"].map(str::to_owned).into_iter().chain(bands);
     let row = |one: &Coverage| {
         let head = [one.recording.clone(), axis(&one.channel, &one.unit), one.samples.to_string()];
@@ -297,10 +297,10 @@ fn parameters_listing(rolled: &Rolled) -> Listing {
             one.target.to_string(),
             rolled.units[k].clone(),
             one.distribution.name().to_owned(),
-            number(one.parameter.nominal),
+            significant(one.parameter.nominal, 4),
         ];
         let told = quantiles(rolled.drawn.row(k), &PARTS).unwrap_or_default();
-        head.into_iter().chain(told.into_iter().map(number)).collect()
+        head.into_iter().chain(told.into_iter().map(|value| significant(value, 4))).collect()
     };
     Listing { heads: heads.map(str::to_owned).to_vec(), rows: rolled.randomized.iter().enumerate().map(row).collect() }
 }
@@ -311,8 +311,8 @@ fn about(rolled: &Rolled) -> Vec<String> {
         "{} draws{level}, each started from the state from which it fits the first rows best. Bands hold draws and measurement \
          noise together; draws cover a recording where at most {} of its samples lie outside the {} band.",
         rolled.drawn.environments(),
-        percent(OUTSIDE),
-        percent(WIDEST)
+        whole_percent(OUTSIDE),
+        whole_percent(WIDEST)
     )]
 }
 

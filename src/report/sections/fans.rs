@@ -5,7 +5,7 @@ use minijinja::{Value, context};
 use crate::report::data_time::DataTime;
 use crate::report::fan::{Fan, FanTime};
 use crate::report::plot::{Curve, Ink, Mark, Plot, Scale};
-use crate::report::quantity::{axis, percent};
+use crate::report::quantity::{axis, whole_percent};
 use crate::report::section::{ReportError, Section, fill};
 
 use super::equity::gaps;
@@ -41,7 +41,7 @@ impl Section for Fans<'_> {
             .bands
             .iter()
             .enumerate()
-            .map(|(k, band)| context! { part => percent(band.part), class => ["inner", "middle", ""][k.min(2)] })
+            .map(|(k, band)| context! { part => whole_percent(band.part), class => ["inner", "middle", ""][k.min(2)] })
             .collect();
         fill(
             "fans.html",
@@ -91,7 +91,61 @@ fn plot(k: usize, fan: &Fan, columns: usize) -> Value {
         height: (330.0, 250.0),
         columns,
     };
-    context! { caption => &fan.caption, plot => Value::from_safe_string(plot.draw(&format!("fan-{k}"))) }
+    let beside = departures(fan).map(|departed| {
+        let Departed { bands, measured, nominal } = &departed;
+        let bands = bands.iter().rev().map(|y| Curve { ink: Ink::Band, mark: Mark::Between, x: &twice, y: y.clone() });
+        let lines = [line(Ink::Measured, &time, measured.clone()), line(Ink::Nominal, &time, nominal.clone())];
+        // Half as much again as the widest band: what runs away is seen to, and flattens nothing.
+        let reach = 1.5 * departed.reach();
+        let plot = Plot {
+            alt: format!("{}: bands, measured and nominal less the median, over time", fan.caption),
+            y_label: axis("less the median", &fan.quantity.1),
+            curves: bands.chain(lines).collect(),
+            zero: true,
+            within: Some((-reach, reach)),
+            height: (230.0, 200.0),
+            ..plot.clone()
+        };
+        plot.draw(&format!("fan-{k}-d"))
+    });
+    context! {
+        caption => &fan.caption,
+        plot => Value::from_safe_string(plot.draw(&format!("fan-{k}"))),
+        beside => Value::from_safe_string(beside.unwrap_or_default()),
+    }
+}
+
+/// How far bands, measurement and nominal depart from the median: bands are often narrower than a line is wide.
+struct Departed {
+    /// Lower and upper ends one after the other, the narrowest band first.
+    bands: Vec<Vec<Option<f64>>>,
+    measured: Vec<Option<f64>>,
+    nominal: Vec<Option<f64>>,
+}
+
+impl Departed {
+    /// The farthest end of the widest band.
+    fn reach(&self) -> f64 {
+        let ends = self.bands.iter().flatten().flatten().filter(|v| v.is_finite());
+        ends.fold(0.0_f64, |most, v| most.max(v.abs())).max(1e-12)
+    }
+}
+
+/// The departures of a fan beside which something was measured; none of another.
+fn departures(fan: &Fan) -> Option<Departed> {
+    let (Some((times, samples)), FanTime::Seconds(time)) = (&fan.measured, &fan.time) else { return None };
+    let mut rows = times.iter().zip(samples).peekable();
+    let mut at = |t: f64| {
+        while rows.next_if(|(time, _)| **time < t).is_some() {}
+        rows.peek().filter(|(time, _)| **time == t).and_then(|(_, sample)| **sample)
+    };
+    let less = |values: &[f64]| values.iter().zip(&fan.median).map(|(v, m)| Some(v - m)).collect::<Vec<_>>();
+    let band = |band: &crate::report::fan::FanBand| less(&band.low).into_iter().chain(less(&band.high)).collect();
+    Some(Departed {
+        bands: fan.bands.iter().map(band).collect(),
+        measured: time.iter().zip(&fan.median).map(|(t, m)| at(*t).map(|v| v - m)).collect(),
+        nominal: less(&fan.nominal),
+    })
 }
 
 /// The least and the largest of what was measured, or else of the widest band.
@@ -124,7 +178,11 @@ mod tests {
             measured: Some((time, vec![Some(0.1); 50])),
         };
         let html = Fans { title: "Draws", about: &[], fans: &[fan] }.render().unwrap();
-        assert_eq!(html.matches("fill-opacity=\"0.3\"").count(), 4, "two bands, on wide screens and narrow ones");
+        assert_eq!(
+            html.matches("fill-opacity=\"0.3\"").count(),
+            8,
+            "two bands in two plots, on wide screens and narrow ones"
+        );
         let (band, line) = (html.find("var(--band)").unwrap(), html.find("var(--nominal)").unwrap());
         assert!(band < line && html.contains("95\u{a0}%") && html.contains("run.csv &lt;position&gt;"), "{html}");
     }
