@@ -250,17 +250,26 @@ impl Entry {
     fn fill(&self, keys: &[u64], row: &mut [f64], level: Level) {
         // What is asked once a row need not be asked once a value.
         match &self.inverse {
-            Inverse::Uniform { .. } => self.fill_by(keys, row, level, |u| self.inverse.at(u)),
-            Inverse::LogUniform { .. } => self.fill_by(keys, row, level, |u| self.inverse.at(u)),
-            Inverse::Normal { .. } => self.fill_by(keys, row, level, |u| self.inverse.at(u)),
+            Inverse::Uniform { low, high } => {
+                let own = Inverse::Uniform { low: *low, high: *high };
+                self.fill_by(keys, row, level, |u| own.at(u));
+            }
+            Inverse::Normal { mean, std } => {
+                let own = Inverse::Normal { mean: *mean, std: *std };
+                self.fill_by(keys, row, level, |u| own.at(u));
+            }
             other => self.fill_by(keys, row, level, |u| other.at(u)),
         }
     }
 
     #[inline]
     fn fill_by(&self, keys: &[u64], row: &mut [f64], level: Level, value: impl Fn(f64) -> f64) {
-        for (value_of, key) in row.iter_mut().zip(keys) {
-            *value_of = self.levelled(*key, value(uniform(*key, self.key)), level);
+        if level == Level::FULL {
+            row.iter_mut().zip(keys).for_each(|(to, key)| *to = value(uniform(*key, self.key)) * self.factor);
+            return;
+        }
+        for (to, key) in row.iter_mut().zip(keys) {
+            *to = self.levelled(*key, value(uniform(*key, self.key)), level);
         }
     }
 

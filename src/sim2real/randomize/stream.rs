@@ -69,9 +69,11 @@ pub(super) fn name_key(name: &str) -> u64 {
 /// The number in (0, 1), neither end ever, of the environment and the parameter of these keys: one of 2^52, evenly apart.
 #[inline]
 pub(super) fn uniform(environment: u64, name: u64) -> f64 {
-    const STEP: f64 = 1.0 / (1_u64 << 52) as f64;
+    // The bits become those of a number from 1 to 2, 2^-52 apart: exact, and sooner done than a conversion.
+    const ONE: u64 = 1.0_f64.to_bits();
+    const HALF_A_STEP: f64 = 0.5 / (1_u64 << 52) as f64;
     let bits = mixed(environment.wrapping_add(name)) >> 12;
-    (bits as f64 + 0.5) * STEP
+    (f64::from_bits(ONE | bits) - 1.0) + HALF_A_STEP
 }
 
 #[cfg(test)]
