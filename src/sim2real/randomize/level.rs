@@ -105,7 +105,7 @@ impl Curriculum {
         let level = match self {
             Self::Constant(level) => *level,
             Self::Linear { from, to, start, end } => {
-                let way = ((progress - start) / (end - start)).max(0.0).min(1.0);
+                let way = if progress > *start { ((progress - start) / (end - start)).min(1.0) } else { 0.0 };
                 (1.0 - way) * from + way * to
             }
             Self::Steps { from, steps } => {
