@@ -201,3 +201,21 @@ fn what_cannot_be_drawn_is_refused_with_what_to_do() {
     let told = servo.refused("rollout twin.toml --recording test.csv");
     assert!(told.contains("not positive definite, its smallest eigenvalue is -0.8"), "{told}");
 }
+
+#[test]
+fn a_trued_run_is_drawn_from_its_posterior() {
+    let scene = bars("");
+    // Orders of a market whose spread is three times what the run assumes.
+    let run = fs::read_to_string(scene.path("run.toml")).unwrap();
+    fs::write(scene.path("real.toml"), run.replace("bps = 1.0", "bps = 3.0")).unwrap();
+    assert_eq!(scene.run("backtest real.toml --out log").0, 0);
+    let diagnosed = scene.run("diagnose run.toml --recording log --out told");
+    assert_eq!(diagnosed.0, 0, "{}", diagnosed.2);
+    let drawn = scene.json("backtest told/trued.toml --draws 40 --out drawn");
+    let spread = &drawn["draws"]["drawn"]["half_spread.bps"];
+    let quantiles: Vec<f64> = spread["quantiles"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+    let trued = spread["nominal"].as_f64().unwrap();
+    // Prices in whole ticks make a spread of 3 bps cost 3.2: that is what the fit finds, and draws lie around it.
+    assert!((2.9..3.5).contains(&trued) && quantiles[0] < trued && trued < quantiles[6], "{spread}");
+    assert!(quantiles[6] - quantiles[0] < 0.5, "{spread}");
+}
