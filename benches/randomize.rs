@@ -1,6 +1,8 @@
 //! How long draws take: 20 parameters for 4,096 environments, on one core. A control step of 4,096 environments takes some
 //! milliseconds, which a reset may not add to.
 
+#![allow(missing_docs, clippy::panic, reason = "a bench has no users, and ends where its randomizer is none")]
+
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
