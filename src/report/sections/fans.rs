@@ -94,12 +94,14 @@ fn plot(k: usize, fan: &Fan, columns: usize) -> Value {
     let beside = departures(fan).map(|departed| {
         let Departed { bands, measured, nominal } = &departed;
         let bands = bands.iter().rev().map(|y| Curve { ink: Ink::Band, mark: Mark::Between, x: &twice, y: y.clone() });
-        let lines = [line(Ink::Measured, &time, measured.clone()), line(Ink::Nominal, &time, nominal.clone())];
+        // Noise drawn as a line would hide what it is held against.
+        let dots = Curve { ink: Ink::Measured, mark: Mark::Dots, x: &time, y: measured.clone() };
+        let lines = [dots, line(Ink::Nominal, &time, nominal.clone())];
         // Half as much again as the widest band: what runs away is seen to, and flattens nothing.
         let reach = 1.5 * departed.reach();
         let plot = Plot {
             alt: format!("{}: bands, measured and nominal less the median, over time", fan.caption),
-            y_label: axis("less the median", &fan.quantity.1),
+            y_label: axis("departure", &fan.quantity.1),
             curves: bands.chain(lines).collect(),
             zero: true,
             within: Some((-reach, reach)),
