@@ -243,7 +243,12 @@ impl<P: Plant> Resolving<'_, P> {
 
     fn no_form(&self, mechanism: &dyn Mechanism<P>, target: &Target, origin: Origin, asked: &[&str]) -> InputError {
         let forms = mechanism.forms(&Default::default());
-        let known: Vec<&str> = forms.iter().flat_map(|form| &form.parameters).map(|p| p.name.as_ref()).collect();
+        let mut known: Vec<&str> = Vec::new();
+        for parameter in forms.iter().flat_map(|form| &form.parameters) {
+            if !known.contains(&parameter.name.as_ref()) {
+                known.push(&parameter.name);
+            }
+        }
         let id = mechanism.about().name;
         let error = |message: String| self.wanted.error(self.document, origin, "parameter", message);
         match asked.iter().find(|name| !known.contains(*name)) {
