@@ -107,6 +107,7 @@ fn every_command_explains_itself() {
         "demo",
         "diagnose",
         "calibrate",
+        "rollout",
         "backtest",
         "paper",
         "audit",

@@ -10,6 +10,7 @@ use crate::report::quantity::UNDEFINED;
 use crate::strategies::{self, StrategyError};
 
 use super::checkpoint::{Going, Ran, Turn};
+use super::draws;
 use super::screen::{self, Screen};
 use super::stop::{Outcome, Stop};
 
@@ -21,11 +22,13 @@ use super::stop::{Outcome, Stop};
 #[command(after_help = "\
 Examples:
   trueup backtest data/bars/run.toml
-  trueup backtest run.toml --out runs/first")]
+  trueup backtest run.toml --out runs/first
+  trueup backtest run.toml --draws 200 --out runs/spread    # [randomize] says what is drawn")]
 pub(super) struct Run {
     /// TOML file of the run: cash, instruments, data, strategy, and what stands between decision and fill
     run: PathBuf,
-    /// Folder to write run.json, orders.parquet, fills.parquet, trades.parquet, equity.parquet and report.html into
+    /// Folder to write run.json, orders.parquet, fills.parquet, trades.parquet, equity.parquet and report.html into; with --draws
+    /// draws.parquet too
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write over files that exist
@@ -37,6 +40,10 @@ pub(super) struct Run {
     /// Seed of all randomness [default: as RUN.toml has it]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Run so many draws besides, each with other parameters of what stands between decision and fill, as [randomize] or a
+    /// [posterior] says, and show how far the figures spread
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000), conflicts_with_all = ["save", "resume", "fork"])]
+    draws: Option<u32>,
     #[command(flatten)]
     turn: Turn,
 }
@@ -48,7 +55,12 @@ impl Run {
         strategy(&file)?;
         let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
         if let Some(folder) = &self.out {
-            OutputFolder::create(folder, overwrite)?.check_free(&RunOutputs::FILES)?;
+            let draws = self.draws.map(|_| RunOutputs::DRAWS);
+            let files: Vec<&str> = RunOutputs::FILES.into_iter().chain(draws).collect();
+            OutputFolder::create(folder, overwrite)?.check_free(&files)?;
+        }
+        if self.draws.is_some() {
+            draws::check(&file)?;
         }
         self.turn.check_free(overwrite)?;
         let prepared = if file.run.stream { prepare_streaming_run(&file)? } else { prepare_run(&file)? };
@@ -62,12 +74,19 @@ impl Run {
                 return Ok(Outcome::Done);
             }
         };
+        let drawn = match self.draws {
+            Some(count) => Some(draws::drawn(&going, &record, count as usize)?),
+            None => None,
+        };
         drop(progress);
         let shown = |record| prepared.outputs(record).map_err(|error| Stop::Bug(error.to_string()));
-        let outputs = shown(&record)?;
+        let mut outputs = shown(&record)?;
+        if let Some(drawn) = &drawn {
+            outputs = outputs.with_draws(drawn);
+        }
         let mut text = match &beside {
             _ if self.json => outputs.json()?,
-            None => told(&outputs, screen),
+            None => told(&outputs, screen) + &draws::told(&outputs, screen),
             Some(beside) => {
                 let told = told_beside(&shown(beside)?, &outputs, screen);
                 format!("{}\n\n{told}", screen.wrapped("", &self.turn.instead_of_what()))

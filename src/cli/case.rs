@@ -130,7 +130,7 @@ impl<P: Plant> Trial for Given<P> {
         let tell = |step: &str, done: usize, of: usize| progress.tell(step, done, of);
         let outcome = diagnose(&self.twin, &self.recordings, &self.held_out, seed, &tell);
         Diagnosed {
-            trued: FittedTwin::of(&outcome.trued, &outcome.values, &outcome.std),
+            trued: FittedTwin::of(&outcome.trued, &outcome.values, &outcome.std, &outcome.correlation),
             diagnosis: outcome.diagnosis,
             comparisons: outcome.comparisons,
             profiles: outcome.profiles,
@@ -141,7 +141,7 @@ impl<P: Plant> Trial for Given<P> {
     fn calibrate(&self, seed: Seed, progress: &Progress) -> (Calibration, FittedTwin) {
         let tell = |step: &str, done: usize, of: usize| progress.tell(step, done, of);
         let calibration = calibrate(&self.twin, &self.recordings, &self.held_out, seed, &tell);
-        let twin = FittedTwin::of(&self.twin, &calibration.values, &calibration.std);
+        let twin = FittedTwin::of(&self.twin, &calibration.values, &calibration.std, &calibration.correlation);
         (calibration, twin)
     }
 

@@ -75,7 +75,7 @@ pub(super) struct Going<'a> {
     pub prepared: &'a PreparedRun,
     pub progress: &'a Progress,
     /// Makes the strategy anew: a run that is repeated begins with one that remembers nothing.
-    pub strategy: &'a dyn Fn() -> Result<Box<dyn Strategy>, InputError>,
+    pub strategy: &'a (dyn Fn() -> Result<Box<dyn Strategy>, InputError> + Sync),
 }
 
 impl Turn {

@@ -1,7 +1,10 @@
 //! A twin after a fit: its parameters with the values the recordings gave them, and the document that says so.
 
+use nalgebra::DMatrix;
+
 use crate::io::{InputError, MechanismEntry, Quantity, TwinFile};
 use crate::market::settle_trued_run;
+use crate::sim2real::randomize::Posterior;
 use crate::sim2real::{Assembly, Parameter, Plant, Simulator};
 
 /// The parameters of a twin after a fit.
@@ -11,6 +14,8 @@ pub(super) struct FittedTwin {
     pub own: Vec<Fitted>,
     /// Those of each mechanism, by its id.
     pub mechanisms: Vec<(&'static str, Vec<Fitted>)>,
+    /// What the fit tells of all of them together.
+    pub posterior: Posterior,
 }
 
 /// A parameter after a fit.
@@ -29,8 +34,8 @@ pub(super) struct Fitted {
 }
 
 impl FittedTwin {
-    /// `assembly` with `values` for its parameters and their standard deviations `std`, in their order.
-    pub fn of<P: Plant>(assembly: &Assembly<P>, values: &[f64], std: &[f64]) -> Self {
+    /// `assembly` with `values` for its parameters, their standard deviations `std` and their `correlation`, in their order.
+    pub fn of<P: Plant>(assembly: &Assembly<P>, values: &[f64], std: &[f64], correlation: &DMatrix<f64>) -> Self {
         let mut estimates = values.iter().copied().zip(std.iter().copied());
         // A plant gives its own units; mechanisms declare theirs in general terms.
         let mut fitted = |parameters: &[Parameter], general: bool| -> Vec<Fitted> {
@@ -48,7 +53,12 @@ impl FittedTwin {
         let own = fitted(assembly.own(), false);
         let mechanisms =
             assembly.mechanisms().map(|(row, _, parameters)| (row.about().name, fitted(parameters, true))).collect();
-        Self { own, mechanisms }
+        let mut fitted = Self { own, mechanisms, posterior: Posterior::default() };
+        let names: Vec<String> = fitted.named().into_iter().map(|(name, _)| name).collect();
+        // What no fit moves is known exactly.
+        let std: Vec<f64> = fitted.named().iter().map(|(_, f)| if f.frozen { 0.0 } else { f.std }).collect();
+        fitted.posterior = Posterior::of_fit(&names, values, &std, correlation);
+        fitted
     }
 
     /// All parameters, those of a mechanism under its id and theirs (`coulomb_friction.torque`).
@@ -102,6 +112,7 @@ impl FittedTwin {
                 }
             }
         }
+        out.posterior = Some(self.posterior.clone()).filter(|posterior| !posterior.is_empty());
         settle_trued_run(&mut out)?;
         Ok(out)
     }
@@ -148,7 +159,9 @@ mod tests {
         );
         let assembly = joint_assembly(&file).unwrap();
         let values = [96.0, 210.0, 0.0, 1.0, 21.0, 50.0];
-        let fitted = FittedTwin::of(&assembly, &values, &[0.5, 2.0, 0.0, 0.0, 0.1, 0.0]);
+        let mut correlated = DMatrix::identity(6, 6);
+        (correlated[(0, 4)], correlated[(4, 0)]) = (-0.25, -0.25);
+        let fitted = FittedTwin::of(&assembly, &values, &[0.5, 2.0, 0.0, 0.0, 0.1, 0.0], &correlated);
         assert_eq!(fitted.named()[4].0, "coulomb_friction.torque");
         let back = read_back(&fitted.document(&file).unwrap());
         let again = joint_assembly(&back).unwrap();
@@ -157,6 +170,10 @@ mod tests {
         assert_eq!(back.mechanisms[0].parameters[0].1, Quantity::with_std(21.0, 0.1, "N"));
         assert!(!back.parameters.contains_key("gain"), "what the file leaves out and no fit moves stays out");
         assert!(again.parameters()[5].frozen());
+        let posterior = back.posterior.unwrap();
+        assert_eq!(posterior, fitted.posterior);
+        assert_eq!(posterior.names, ["inertia", "viscous_friction", "coulomb_friction.torque"]);
+        assert_eq!((posterior.std, posterior.correlation), (vec![0.5, 2.0, 0.1], vec![vec![0.0], vec![-0.25, 0.0]]));
     }
 
     #[test]
@@ -164,7 +181,7 @@ mod tests {
         let text = "[twin]\nmodel = \"execution\"\n[assumptions]\nprice = \"mid\"\ncommission_bps = 0.5\n\
                     [[instrument]]\nsymbol = \"XYZ\"\ntick_size = 0.01\n";
         let file = TwinFile::parse(Document::from_text("twin.toml", text)).unwrap();
-        let fitted = FittedTwin::of(&execution_assembly(&file).unwrap(), &[0.41], &[0.0]);
+        let fitted = FittedTwin::of(&execution_assembly(&file).unwrap(), &[0.41], &[0.0], &DMatrix::identity(1, 1));
         let back = read_back(&fitted.document(&file).unwrap());
         let again = execution_assembly(&back).unwrap();
         assert_eq!((again.parameters().len(), again.parameters()[0].nominal), (1, 0.41));

@@ -11,6 +11,7 @@ mod checkpoint;
 mod data;
 mod demo;
 mod diagnose;
+mod draws;
 mod figures;
 mod fitted;
 mod log_arguments;
@@ -19,6 +20,7 @@ mod paper;
 mod prove;
 mod reconcile;
 mod regimes;
+mod rollout;
 mod screen;
 mod stop;
 mod sweep;
@@ -59,6 +61,7 @@ enum Command {
     Demo(demo::Demo),
     Diagnose(diagnose::Diagnose),
     Calibrate(calibrate::Calibrate),
+    Rollout(rollout::Rollout),
     Backtest(backtest::Run),
     Paper(paper::Paper),
     Reconcile(reconcile::Reconcile),
@@ -105,6 +108,7 @@ impl Command {
             Self::Demo(command) => command.run(screen),
             Self::Diagnose(command) => command.run(screen),
             Self::Calibrate(command) => command.run(screen),
+            Self::Rollout(command) => command.run(screen),
             Self::Backtest(command) => command.run(screen),
             Self::Paper(command) => command.run(screen),
             Self::Reconcile(command) => command.run(screen),

@@ -18,6 +18,8 @@ pub(super) enum Change {
     Remove(Vec<String>),
     /// A list gets another entry, with these keys in their order.
     Append(&'static str, Vec<(String, Value)>),
+    /// A section that is not there yet, with these keys in their order.
+    Section(&'static str, Vec<(String, Value)>),
 }
 
 impl Document {
@@ -39,6 +41,10 @@ impl Document {
     fn apply(&self, change: &Change, table: &mut Table) -> Result<(), InputError> {
         let keys = match change {
             Change::Set(keys, _) | Change::Remove(keys) => keys,
+            Change::Section(name, pairs) => {
+                table.insert((*name).to_owned(), Value::Table(pairs.iter().cloned().collect()));
+                return Ok(());
+            }
             Change::Append(list, entry) => {
                 let entries = table.entry(*list).or_insert_with(|| Value::Array(Vec::new()));
                 let entries = entries.as_array_mut().ok_or_else(|| self.error(&[list], "expected a list of tables"))?;
@@ -83,6 +89,11 @@ impl Document {
                 Change::Append(list, entry) => {
                     let keys = entry.iter().map(|(name, value)| (name.as_str(), Some(written(value))));
                     section(&mut added, &format!("[[{list}]]"), keys);
+                    continue;
+                }
+                Change::Section(name, pairs) => {
+                    let keys = pairs.iter().map(|(name, value)| (name.as_str(), Some(written(value))));
+                    section(&mut added, &format!("[{name}]"), keys);
                     continue;
                 }
                 Change::Set(keys, value) => edits.push(self.set(root.get_ref(), keys, value)?),

@@ -16,10 +16,13 @@ use super::feed_format::check_file;
 use super::feed_rules::span;
 use super::halt_entry::{HaltEntry, HaltTable, halt_entries};
 use super::instrument_entry::{InstrumentEntry, check_instruments, check_terms};
+use super::posterior_section::check_posterior;
 use super::quantity::{MechanismEntry, check_mechanisms};
+use super::randomize_section::{RandomizeSection, RandomizeTable};
 use super::rate_entry::{RateEntry, RateSource, RateTable, rate_entries};
 use super::sweep_section::{SweepSection, SweepTable};
 use super::twin_file::{AssumedPrice, Assumptions, TwinFile};
+use crate::sim2real::randomize::Posterior;
 use crate::sim2real::{Timestamp, written_instant};
 
 /// A run, as its document declares it.
@@ -48,6 +51,10 @@ pub struct RunFile {
     pub assumptions: Option<Assumptions>,
     /// `[sweep]`: which values of all that are tried. A backtest has no use for it.
     pub sweep: Option<SweepSection>,
+    /// `[posterior]`: what the fit that its mechanisms come from tells of their parameters together.
+    pub posterior: Option<Posterior>,
+    /// `[randomize]`: what is drawn anew for every draw, and how. A single run has no use for it.
+    pub randomize: Option<RandomizeSection>,
 }
 
 /// `[run]`.
@@ -98,6 +105,8 @@ struct RunTable {
     #[serde(default)]
     mechanism: Vec<MechanismEntry>,
     sweep: Option<SweepTable>,
+    posterior: Option<Posterior>,
+    randomize: Option<RandomizeTable>,
     #[serde(default)]
     execution: ExecutionSection,
     assumptions: Option<Assumptions>,
@@ -184,6 +193,9 @@ impl RunFile {
         let table: RunTable = document.parse()?;
         check_twin_sections(&document, &table)?;
         let RunTable { run, instrument, data, rate, halt, strategy, mechanism, sweep, execution, assumptions, .. } = table;
+        check_posterior(&document, table.posterior.as_ref())?;
+        let posterior = table.posterior;
+        let randomize = table.randomize.map(|table| RandomizeSection::of(&document, table)).transpose()?;
         if !run.cash.is_finite() || run.cash < 0.0 {
             let error = document.error(&["run", "cash"], "expected a finite number that is not negative");
             return Err(error.found(run.cash).hint("it is what the run starts with"));
@@ -225,6 +237,8 @@ impl RunFile {
             twin,
             assumptions,
             sweep,
+            posterior,
+            randomize,
         };
         run.sweep.iter().try_for_each(|sweep| run.check_sweep(sweep))?;
         Ok(run)

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 use super::document_edit::Change;
 use super::error::InputError;
 use super::instrument_entry::names_a_file;
+use super::posterior_section::posterior_values;
 use super::quantity::{MechanismEntry, Quantity};
 use super::relative_path::path_from;
 use super::twin_file::TwinFile;
@@ -19,7 +20,7 @@ struct OnlyMechanisms {
 }
 
 /// Where a document names files: a section, whether it is a list, and its keys.
-const FILES: [(&str, bool, &[&str]); 7] = [
+const FILES: [(&str, bool, &[&str]); 8] = [
     ("data", true, &["bars", "quotes", "trades", "book", "actions", "snapshot"]),
     ("instrument", true, &["calendar"]),
     ("rate", true, &["file"]),
@@ -27,6 +28,7 @@ const FILES: [(&str, bool, &[&str]); 7] = [
     ("market", false, &["quotes", "trades", "bars"]),
     ("execution", false, &["twin"]),
     ("paper", false, &["kill_file"]),
+    ("randomize", false, &["posterior"]),
 ];
 
 impl TwinFile {
@@ -47,11 +49,26 @@ impl TwinFile {
         {
             changes.push(Change::Set(path(&["run", "shows_own_orders"]), Value::Boolean(shows)));
         }
+        changes.extend(self.posterior_changes(&whole));
         let home = document.resolve("");
         if path_from(folder, &home.join("file")) != "file" {
             changes.extend(self.path_changes(&whole, folder));
         }
         document.changed(&changes)
+    }
+
+    /// What the posterior changes: there is one, or there is none any more.
+    fn posterior_changes(&self, whole: &Table) -> Vec<Change> {
+        let before = whole.get("posterior").and_then(Value::as_table);
+        match (&self.posterior, before) {
+            (None, None) => Vec::new(),
+            (None, Some(_)) => vec![Change::Remove(path(&["posterior"]))],
+            (Some(posterior), None) => vec![Change::Section("posterior", posterior_values(posterior))],
+            (Some(posterior), Some(_)) => {
+                let values = posterior_values(posterior).into_iter();
+                values.map(|(key, value)| Change::Set(path(&["posterior", &key]), value)).collect()
+            }
+        }
     }
 
     /// What the mechanisms change where the document lists `own`.

@@ -12,10 +12,13 @@ use super::equation_sections::{AttachEntry, EquationSections, InputEntry, Named,
 use super::error::InputError;
 use super::instrument_entry::{InstrumentEntry, check_instruments, check_no_terms};
 use super::market_files::{MarketFiles, MarketTable, market_files, market_keys};
+use super::posterior_section::{check_posterior, posterior_keys};
 use super::quantity::{MechanismEntry, Quantity, check_mechanisms};
+use super::randomize_section::{RandomizeSection, RandomizeTable};
 use super::run_file::RunFile;
 use super::toml_text::{float, section, short_form, table_form, text};
 use super::unit::check_unit;
+use crate::sim2real::randomize::Posterior;
 
 /// A twin, as its document declares it: a TWIN.toml, or a RUN.toml, which says how its orders are executed.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,6 +46,10 @@ pub struct TwinFile {
     pub market: Option<MarketFiles>,
     /// `[[data]]`: the tape instrument by instrument, where no `[market]` names one.
     pub data: Vec<DataEntry>,
+    /// `[posterior]`: what the fit that the twin comes from tells of its parameters together.
+    pub posterior: Option<Posterior>,
+    /// `[randomize]`: what is drawn anew for every environment, and how.
+    pub randomize: Option<RandomizeSection>,
     /// The run that the document is, where it is one.
     pub run: Option<Box<RunFile>>,
     /// Keys of the document that what has been fitted says instead, such as `["latency", "order"]`.
@@ -131,6 +138,8 @@ struct TwinTable {
     market: Option<MarketTable>,
     #[serde(default)]
     data: Vec<DataTable>,
+    posterior: Option<Posterior>,
+    randomize: Option<RandomizeTable>,
 }
 
 /// What a document that is a run says as a twin.
@@ -209,9 +218,13 @@ impl TwinFile {
             entry.check_files(&document, &number.to_string())?;
         }
         let data = data.into_iter().map(|entry| entry.resolved(&document)).collect();
+        check_posterior(&document, table.posterior.as_ref())?;
+        let randomize = table.randomize.map(|table| RandomizeSection::of(&document, table)).transpose()?;
         Ok(Self {
             document,
             data,
+            posterior: table.posterior,
+            randomize,
             run: None,
             superseded: Vec::new(),
             model: table.twin.model,
@@ -243,6 +256,8 @@ impl TwinFile {
             assumptions: run.assumptions,
             instruments: run.instruments.clone(),
             data: run.data.clone(),
+            posterior: run.posterior.clone(),
+            randomize: run.randomize.clone(),
             document,
             market,
             run: Some(Box::new(run)),
@@ -328,6 +343,13 @@ impl TwinFile {
         }
         if let Some(market) = &self.market {
             section(&mut out, "[market]", market_keys(market, folder));
+        }
+        if let Some(posterior) = &self.posterior {
+            section(&mut out, "[posterior]", posterior_keys(posterior));
+        }
+        if let Some(randomize) = &self.randomize {
+            out.push('\n');
+            out.push_str(&randomize.render(&self.document, folder));
         }
         out
     }

@@ -265,6 +265,12 @@ impl DataSeen {
 }
 
 impl Backtest {
+    /// The same backtest, with orders filled by `venue`.
+    #[must_use]
+    pub fn with_venue(&self, venue: Assembly<Execution>) -> Self {
+        Self { venue, ..self.clone() }
+    }
+
     /// A backtest of `instruments` on `histories` (one an instrument, in the same order), with orders filled by `venue`.
     ///
     /// # Errors

@@ -27,6 +27,10 @@ mod depth_book;
 #[cfg(feature = "io")]
 mod depth_quotes;
 mod desk;
+#[cfg(feature = "io")]
+mod draw_page;
+#[cfg(feature = "io")]
+mod draws;
 mod equity_curve;
 mod execution;
 mod feed;
@@ -64,6 +68,8 @@ pub mod paper;
 #[cfg(feature = "io")]
 pub mod paper_run;
 mod past;
+#[cfg(feature = "io")]
+mod preset;
 mod price_assumption;
 mod queue_place;
 mod quote;
@@ -135,6 +141,8 @@ pub use data_summary::DataSummary;
 pub use decimal::{DecimalError, Rounded};
 pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
 pub use depth_book::DepthBook;
+#[cfg(feature = "io")]
+pub use draws::{DrawOutcome, DrawnRun, DrawsSummary, RunDraws};
 pub use execution::{Executed, Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
 pub use feed::{Arrival, Feed};
 pub use foresight::Foresight;
@@ -155,6 +163,8 @@ pub use money::{Cash, Increments, MoneyError, Price, Quantity};
 pub use order::{InFlight, Posted, Role, Side};
 pub use order_log::{LogMarket, OrderLog};
 pub use own_print::{Piece, own_print, shown_delay};
+#[cfg(feature = "io")]
+pub use preset::presets as market_presets;
 pub use price_assumption::PriceAssumption;
 pub use quote::{Quote, QuoteSlice, Quotes};
 pub use reason::Reason;

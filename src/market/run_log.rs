@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use crate::io::{InputError, OutputFolder, OutputTable};
 use crate::report::{BacktestPage, ReportError};
 
+use super::draws::{DrawsSummary, RunDraws};
 use super::metric::{Counts, CurrencySummary, InstrumentSummary, Metrics, RoundTrip};
 use super::run_page::run_page;
 use super::{Backtest, DataSummary, HaltSummary, Instrument, MoneyError, Price, Record, Reference};
@@ -73,6 +74,9 @@ pub struct RunSummary {
     pub halts: Vec<HaltSummary>,
     /// What was found in the data, file by file.
     pub data: Vec<DataSummary>,
+    /// What randomized executions came to; none of a run alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub draws: Option<DrawsSummary>,
 }
 
 impl RunSummary {
@@ -94,6 +98,7 @@ impl RunSummary {
             instruments: InstrumentSummary::of(record, instruments)?,
             halts: HaltSummary::of(record, instruments),
             data: DataSummary::of(record, instruments),
+            draws: None,
         })
     }
 }
@@ -111,6 +116,8 @@ pub struct RunOutputs {
     pub trades: OutputTable,
     /// `equity.parquet`.
     pub equity: OutputTable,
+    /// `draws.parquet`, of a run with randomized executions.
+    pub draws: Option<OutputTable>,
     /// `report.html`.
     pub page: BacktestPage,
 }
@@ -146,9 +153,23 @@ impl RunOutputs {
             fills: record.fills_table(),
             trades: trades_table(&trips, &summary),
             equity: record.equity_table(),
+            draws: None,
             page: run_page(&summary, backtest, record, &trips),
             summary,
         })
+    }
+
+    /// The file there is besides, of a run with randomized executions.
+    pub const DRAWS: &str = "draws.parquet";
+
+    /// The same with what randomized executions of the run came to.
+    #[must_use]
+    pub fn with_draws(mut self, draws: &RunDraws) -> Self {
+        let summary = draws.summary(&self.summary.metrics);
+        self.page.draws = Some(draws.page(&summary, &self.page));
+        self.draws = Some(draws.table());
+        self.summary.draws = Some(summary);
+        self
     }
 
     /// `run.json` as text.
@@ -170,6 +191,9 @@ impl RunOutputs {
         folder.table(fills, &self.fills)?;
         folder.table(trades, &self.trades)?;
         folder.table(equity, &self.equity)?;
+        if let Some(draws) = &self.draws {
+            folder.table(Self::DRAWS, draws)?;
+        }
         folder.file(page, self.page.render()?.as_bytes())?;
         Ok(())
     }

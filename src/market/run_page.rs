@@ -35,6 +35,7 @@ pub(super) fn run_page(summary: &RunSummary, backtest: &Backtest, record: &Recor
         costs: costs(&summary.metrics),
         in_force: in_force(summary, backtest, record),
         inputs: inputs(summary),
+        draws: None,
     }
 }
 

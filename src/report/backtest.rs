@@ -1,10 +1,13 @@
 //! The page of a backtest, from plain data.
 
+use super::fan::Fan;
 use super::page::Page;
-use super::section::ReportError;
+use super::section::{ReportError, Section};
 use super::sections::{
-    AllFigures, Assumptions, Costs, Drawdowns, Equity, ExposurePlot, Fills, Inputs, Metrics, Months, RoundTrips,
+    AllFigures, Assumptions, Costs, Drawdowns, Equity, ExposurePlot, Fans, Fills, Inputs, ListingTable, Metrics, Months,
+    RoundTrips,
 };
+use super::sweep::Listing;
 
 /// What the page of a backtest shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,6 +46,21 @@ pub struct BacktestPage {
     pub in_force: Vec<InForce>,
     /// What the run was made from.
     pub inputs: Vec<Input>,
+    /// What randomized executions of it came to; none of a run alone.
+    pub draws: Option<DrawsPart>,
+}
+
+/// What randomized executions of a run came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawsPart {
+    /// What was drawn, and what the figures rest on, a paragraph each.
+    pub about: Vec<String>,
+    /// Equity over time.
+    pub fan: Fan,
+    /// Quantiles of the figures.
+    pub figures: Listing,
+    /// Quantiles of what was drawn.
+    pub parameters: Listing,
 }
 
 /// A key figure.
@@ -183,7 +201,7 @@ impl BacktestPage {
     /// # Errors
     /// If a template cannot be rendered.
     pub fn render(&self) -> Result<String, ReportError> {
-        let page = Page {
+        let mut page = Page {
             kind: "Backtest",
             heading: self.title.clone(),
             badge: None,
@@ -201,6 +219,19 @@ impl BacktestPage {
                 Box::new(Inputs { page: self }),
             ],
         };
+        if let Some(draws) = &self.draws {
+            let fan = std::slice::from_ref(&draws.fan);
+            let listing = |id, title, listing| Box::new(ListingTable { id, title, about: &[], listing });
+            // After the equity of the run as it is written.
+            page.sections.splice(
+                2..2,
+                [
+                    Box::new(Fans { title: "Randomized execution", about: &draws.about, fans: fan }) as Box<dyn Section>,
+                    listing("draw-figures", "Figures over all draws", &draws.figures),
+                    listing("drawn", "What was drawn", &draws.parameters),
+                ],
+            );
+        }
         page.render()
     }
 }

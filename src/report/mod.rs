@@ -7,21 +7,27 @@ mod backtest;
 mod data_time;
 mod decimate;
 mod diagnosis;
+mod fan;
 mod figures;
 mod page;
 mod plot;
 mod proof;
 pub(crate) mod quantity;
 mod reconcile;
+mod rollout;
 mod section;
 mod sections;
 mod sweep;
 
-pub use backtest::{BacktestPage, Cost, Exposure, Fall, FigureGroup, Fill, InForce, Input, Metric, MonthReturn, Trade};
+pub use backtest::{
+    BacktestPage, Cost, DrawsPart, Exposure, Fall, FigureGroup, Fill, InForce, Input, Metric, MonthReturn, Trade,
+};
 pub use diagnosis::diagnosis_page;
+pub use fan::{Fan, FanBand, FanTime};
 pub use figures::{Abscissa, DiagnosisFigures, Trace};
 pub use page::{Badge, Page, Tone};
 pub use proof::{ConfusionTable, ProofFailure, ProofFigure, ProofPage};
 pub use reconcile::{GapCause, ReconcilePage, ReconcileTable};
+pub use rollout::RolloutPage;
 pub use section::{ReportError, Section};
 pub use sweep::{HeatMap, Listing, Scatter, SweepPage, WalkForwardPage};

@@ -6,6 +6,7 @@
 mod svg;
 
 use chrono::DateTime;
+use kuva::plot::band::BandPlot;
 use kuva::plot::scatter::ScatterPlot;
 use kuva::plot::{LinePlot, LineStyle};
 use kuva::render::annotations::{ReferenceLine, ShadedRegion, TextAnnotation};
@@ -29,6 +30,10 @@ pub(super) enum Ink {
     Loss,
     /// How far a result might lie.
     Bound,
+    /// The middle of many draws.
+    Median,
+    /// What a part of many draws lies within.
+    Band,
     /// One of several things of a kind, told apart by its number.
     Member(usize),
 }
@@ -47,6 +52,8 @@ impl Ink {
             Self::Equity => "equity",
             Self::Loss => "loss",
             Self::Bound => "bound",
+            Self::Median => "median",
+            Self::Band => "band",
             Self::Member(k) => ["member-0", "member-1", "member-2", "member-3"][k % Self::MEMBERS],
         }
     }
@@ -83,6 +90,8 @@ pub(super) enum Mark {
     /// A value holds until the next.
     Step,
     Dots,
+    /// The area between the first half of the points and the second, which are of the same places.
+    Between,
 }
 
 /// One series.
@@ -199,6 +208,15 @@ impl Plot<'_> {
                 marks.push(dots.with_size(2.2).with_marker_opacity(0.75).into());
                 continue;
             }
+            if curve.mark == Mark::Between {
+                let (x, half) = (&curve.x[..curve.x.len() / 2], curve.x.len() / 2);
+                let whole: Option<Vec<f64>> = curve.y.iter().map(|y| y.filter(|y| y.is_finite())).collect();
+                if let Some(y) = whole.filter(|_| half > 1) {
+                    let band = BandPlot::new(x.to_vec(), y[..half].to_vec(), y[half..].to_vec());
+                    marks.push(band.with_color(curve.ink.color()).with_opacity(0.3).into());
+                }
+                continue;
+            }
             for mut stretch in extremes(curve.x, &curve.y, columns) {
                 // A lone sample is a line of no length, which round caps make a dot.
                 if let [only] = stretch[..] {
@@ -209,7 +227,7 @@ impl Plot<'_> {
                 let line = match curve.mark {
                     Mark::Area => line.with_fill().with_fill_opacity(0.16),
                     Mark::Step => line.with_step(),
-                    Mark::Line | Mark::Dots => line,
+                    Mark::Line | Mark::Dots | Mark::Between => line,
                 };
                 marks.push(line.into());
             }

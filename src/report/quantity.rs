@@ -56,6 +56,11 @@ pub(crate) fn percent(part: f64) -> String {
     }
 }
 
+/// A part of one that is a round number of percent: `95 %`.
+pub(crate) fn whole_percent(part: f64) -> String {
+    format!("{}\u{a0}%", decimals(100.0 * part, 0))
+}
+
 /// A probability that something is so: nothing is certain.
 pub(crate) fn confidence(part: f64) -> String {
     if part > 0.99 { "> 99\u{a0}%".into() } else { percent(part) }

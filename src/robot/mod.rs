@@ -6,6 +6,7 @@ mod estimate;
 mod joint;
 pub mod mechanism;
 mod mover;
+mod preset;
 mod runge_kutta;
 mod signal;
 mod sine;
@@ -21,6 +22,7 @@ pub use equations::{
 pub use joint::{Axis, Joint, JointDynamics, Posture};
 pub use mechanism::{CART_POLE_MECHANISMS, EQUATIONS_MECHANISMS, MECHANISMS, TANKS_MECHANISMS};
 pub use mover::{Motion, Mover, Push};
+pub use preset::presets as robot_presets;
 pub use signal::{Commands, Signal};
 pub use tanks::{Level, Levels, Rims, Tanks, TanksDynamics};
 #[cfg(feature = "io")]

@@ -4,6 +4,8 @@
 mod cart_pole;
 mod equations;
 mod joint;
+#[cfg(test)]
+mod randomized;
 mod tanks;
 
 use std::path::Path;

@@ -5,6 +5,8 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::DMatrix;
+
 use super::diagnosis::{Diagnosis, Effect, Verdict, Where};
 use super::words::{self, Facts};
 use super::{Answered, Outcome};
@@ -56,7 +58,7 @@ pub(super) fn joined<T: Twin>(twin: &T, mut first: Answered<T>, mut others: Vec<
         let all = std::iter::once(&mut first).chain(&mut others);
         unproved.extend(all.filter_map(|answer| withdrawn(twin, answer)));
     }
-    let (trued, values, std) = twins(twin, &std::iter::once(&first).chain(&others).collect::<Vec<_>>());
+    let (trued, values, std, correlation) = twins(twin, &std::iter::once(&first).chain(&others).collect::<Vec<_>>());
     let Answered { outcome: mut whole, mut facts, .. } = first;
     for Answered { outcome, facts: more, .. } in others {
         whole.comparisons.extend(outcome.comparisons);
@@ -67,7 +69,7 @@ pub(super) fn joined<T: Twin>(twin: &T, mut first: Answered<T>, mut others: Vec<
     }
     finish(&mut whole.diagnosis, &facts, verdict);
     whole.diagnosis.checks.notes.extend(unproved);
-    Outcome { trued, values, std, ..whole }
+    Outcome { trued, values, std, correlation, ..whole }
 }
 
 /// Whether an aspect says that something is missing.
@@ -85,7 +87,7 @@ fn verdict(diagnoses: &[Diagnosis]) -> Verdict {
 
 /// Takes back what an aspect has found that does not hold on data it has not seen; gives what is to be said of it.
 fn withdrawn<T: Twin>(twin: &T, answer: &mut Answered<T>) -> Option<String> {
-    let Outcome { diagnosis, trued, values, std, comparisons, .. } = &mut answer.outcome;
+    let Outcome { diagnosis, trued, values, std, correlation, comparisons, .. } = &mut answer.outcome;
     if diagnosis.verdict != Verdict::NotExcited || diagnosis.effects.is_empty() {
         return None;
     }
@@ -95,6 +97,8 @@ fn withdrawn<T: Twin>(twin: &T, answer: &mut Answered<T>) -> Option<String> {
     *trued = twin.clone();
     values.truncate(twin.parameters().len());
     std.truncate(twin.parameters().len());
+    let own = twin.parameters().len();
+    *correlation = correlation.view((0, 0), (own, own)).into_owned();
     for comparison in comparisons {
         comparison.trued.clone_from(&comparison.recalibrated);
     }
@@ -108,18 +112,19 @@ fn withdrawn<T: Twin>(twin: &T, answer: &mut Answered<T>) -> Option<String> {
     Some(said)
 }
 
-/// The twin with what was found in all aspects, its parameters and their standard deviations: its own as the aspect knows them that
-/// knows them best.
-fn twins<T: Twin>(twin: &T, answers: &[&Answered<T>]) -> (T, Vec<f64>, Vec<f64>) {
+/// The twin with what was found in all aspects, its parameters, their standard deviations and correlations: its own as the aspect
+/// knows them that knows them best. What two aspects tell is not correlated.
+fn twins<T: Twin>(twin: &T, answers: &[&Answered<T>]) -> (T, Vec<f64>, Vec<f64>, DMatrix<f64>) {
     let own = twin.parameters().len();
     let best = |k: usize| {
-        let all = answers.iter().map(|answer| (answer.outcome.std[k], answer.outcome.values[k]));
-        all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, twin.parameters()[k].nominal))
+        let all = answers.iter().enumerate();
+        all.min_by(|(_, a), (_, b)| a.outcome.std[k].total_cmp(&b.outcome.std[k])).map_or(0, |(number, _)| number)
     };
-    let (mut std, mut values): (Vec<f64>, Vec<f64>) = (0..own).map(best).unzip();
+    // Which answer tells each parameter, and its number there.
+    let mut told: Vec<(usize, usize)> = (0..own).map(|k| (best(k), k)).collect();
     let mut trued = twin.clone();
     let mut taken: Vec<&str> = Vec::new();
-    for answer in answers {
+    for (number, answer) in answers.iter().enumerate() {
         let mut at = own;
         for candidate in &answer.added {
             let Candidate { about, form, .. } = candidate;
@@ -130,11 +135,17 @@ fn twins<T: Twin>(twin: &T, answers: &[&Answered<T>]) -> (T, Vec<f64>, Vec<f64>)
             }
             taken.push(about.name);
             trued = trued.with(candidate);
-            values.extend_from_slice(&answer.outcome.values[rows.clone()]);
-            std.extend_from_slice(&answer.outcome.std[rows]);
+            told.extend(rows.map(|row| (number, row)));
         }
     }
-    (trued, values, std)
+    let outcome = |number: usize| &answers[number].outcome;
+    let values = told.iter().map(|(number, k)| outcome(*number).values[*k]).collect();
+    let std = told.iter().map(|(number, k)| outcome(*number).std[*k]).collect();
+    let correlation = DMatrix::from_fn(told.len(), told.len(), |i, j| match (told[i], told[j]) {
+        ((of, k), (other, l)) if of == other => outcome(of).correlation[(k, l)],
+        _ => 0.0,
+    });
+    (trued, values, std, correlation)
 }
 
 /// What is told of all aspects together once all are joined.

@@ -96,25 +96,37 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
     /// The state from which a simulator at `theta` best starts a held-out part: estimated from the rows before it where a
     /// run passes through them, from its first rows elsewhere.
     pub(super) fn settled<T: Simulator<Stimulus = S>>(&self, simulator: &T, theta: &[f64], part: &Part<'a, S>) -> Vec<f64> {
-        let end = if part.rows.start > part.start {
-            part.rows.start
-        } else {
-            let rows = part.rows.len();
-            part.start + ((rows as f64 * SETTLING) as usize).clamp(20.min(rows), rows)
-        };
-        let first = [Part { recording: part.recording, start: part.start, rows: part.start..end }];
-        let problem = Problem { simulator, parts: &first, weights: &self.weights, seed: Seed(0) };
-        let mut state = State::estimated(&problem);
-        for _ in 0..3 {
-            let evaluation = problem.evaluate(theta, &state, &[]);
-            let rows = evaluation.residual.len().max(1) as f64;
-            state.misfit = (evaluation.residual.norm_squared() / rows).sqrt().max(1.0);
-            for (value, step) in state.values[0].iter_mut().zip(&evaluation.initial_step[0]) {
-                *value += step;
-            }
-        }
-        state.values.swap_remove(0)
+        settled(simulator, theta, part, &self.weights)
     }
+}
+
+/// The state from which a simulator at `theta` best starts `part`: estimated from the rows before it where a run passes through
+/// them, from its first rows elsewhere. The noise of each channel is that of `weights`.
+#[must_use]
+pub fn settled<S: Simulator>(
+    simulator: &S,
+    theta: &[f64],
+    part: &Part<'_, S::Stimulus>,
+    weights: &[ChannelWeight],
+) -> Vec<f64> {
+    let end = if part.rows.start > part.start {
+        part.rows.start
+    } else {
+        let rows = part.rows.len();
+        part.start + ((rows as f64 * SETTLING) as usize).clamp(20.min(rows), rows)
+    };
+    let first = [Part { recording: part.recording, start: part.start, rows: part.start..end }];
+    let problem = Problem { simulator, parts: &first, weights, seed: Seed(0) };
+    let mut state = State::estimated(&problem);
+    for _ in 0..3 {
+        let evaluation = problem.evaluate(theta, &state, &[]);
+        let rows = evaluation.residual.len().max(1) as f64;
+        state.misfit = (evaluation.residual.norm_squared() / rows).sqrt().max(1.0);
+        for (value, step) in state.values[0].iter_mut().zip(&evaluation.initial_step[0]) {
+            *value += step;
+        }
+    }
+    state.values.swap_remove(0)
 }
 
 /// How long windows must be [s] for a plant that never forgets where it started: there, a free run adds up all errors

@@ -42,12 +42,14 @@ pub use diagnosis::{
     Bin, Change, ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment, ParameterChange,
     RecordingError, Rival, SCHEMA, Score, Stretch, Verdict, Where,
 };
-pub use evidence::{Evidence, HELD_OUT};
+pub use evidence::{Evidence, HELD_OUT, settled};
 pub use excitation::Excitation;
 pub use experiment::EXPERIMENT_FILE;
 pub use hypothesis::Hypothesis;
 pub use noise::channel_weights;
 pub use profile::Profile;
+
+use nalgebra::DMatrix;
 
 use hypothesis::Inquiry;
 use prove::Contest;
@@ -96,6 +98,8 @@ pub struct Outcome<T> {
     pub values: Vec<f64>,
     /// Their standard deviations.
     pub std: Vec<f64>,
+    /// Their correlations; 0 where no fit tells.
+    pub correlation: DMatrix<f64>,
     /// Measurements beside the three twins.
     pub comparisons: Vec<Comparison>,
     /// Errors over the states they may depend on.
@@ -111,6 +115,8 @@ pub struct Calibration {
     pub values: Vec<f64>,
     /// Their standard deviations.
     pub std: Vec<f64>,
+    /// Their correlations; 0 where no fit tells.
+    pub correlation: DMatrix<f64>,
     /// Names of the parameters that ended at a bound.
     pub at_bound: Vec<String>,
     /// Errors on held-out data; the trued twin is the recalibrated one.
@@ -248,6 +254,7 @@ fn followed<T: Twin>(
     });
     let facts = verdict::facts(&inquiry, &findings);
     let mut added: Vec<Candidate> = selection.selected.added.iter().map(|number| candidates[*number].clone()).collect();
+    let mut correlation = trued.correlation(selection.selected.twin.parameters());
     let (mut trued_twin, mut values, mut std) = (selection.selected.twin, trued.values, findings.std);
     for candidate in seen {
         trued_twin = trued_twin.with(candidate);
@@ -255,7 +262,11 @@ fn followed<T: Twin>(
         std.resize(values.len(), 0.0);
         added.push(candidate.clone());
     }
-    let outcome = Outcome { diagnosis, trued: trued_twin, values, std, comparisons, profiles, excitation };
+    // What was seen without a fit goes with nothing else.
+    let fitted = correlation.nrows();
+    correlation = correlation.resize(values.len(), values.len(), 0.0);
+    (fitted..values.len()).for_each(|k| correlation[(k, k)] = 1.0);
+    let outcome = Outcome { diagnosis, trued: trued_twin, values, std, correlation, comparisons, profiles, excitation };
     Answered { outcome, added, facts }
 }
 
@@ -305,6 +316,7 @@ pub fn calibrate<T: Twin>(
     let comparisons = prove::compared(&contest, &evidence, seed);
     Calibration {
         std: inflated(&inquiry, &hypothesis, &fit),
+        correlation: fit.correlation(twin.parameters()),
         at_bound: fit.at_bound.iter().map(|k| twin.parameters()[*k].name.clone().into_owned()).collect(),
         values: fit.values,
         fit: prove::channel_fits(&comparisons, &noise_of(&inquiry, &hypothesis), seed),

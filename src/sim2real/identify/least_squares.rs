@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::problem::{DIFFERENCE, Evaluation, Problem, Runs, State};
-use crate::sim2real::Simulator;
+use crate::sim2real::{Parameter, Simulator};
 
 /// Directions in which the data move the parameters less than this part of the strongest count as not determined:
 /// derivatives are known no better than the step of their finite differences.
@@ -55,6 +55,30 @@ impl Fit {
     #[must_use]
     pub fn objective(&self) -> f64 {
         self.residual.norm_squared() + self.prior
+    }
+
+    /// Correlations of all of the simulator's parameters, which are `parameters`: 1 with themselves, and 0 where the fit does not
+    /// tell.
+    #[must_use]
+    pub fn correlation(&self, parameters: &[Parameter]) -> DMatrix<f64> {
+        let count = self.values.len();
+        let mut all = DMatrix::identity(count, count);
+        let Some(covariance) = &self.covariance else { return all };
+        // Those that the output jumps with have no covariance.
+        let smooth: Vec<usize> = match self.free.len() == covariance.nrows() {
+            true => self.free.clone(),
+            false => self.free.iter().copied().filter(|k| parameters[*k].smooth).collect(),
+        };
+        if smooth.len() != covariance.nrows() {
+            return all;
+        }
+        for (i, row) in smooth.iter().enumerate() {
+            for (j, column) in smooth.iter().enumerate().filter(|(j, _)| *j != i) {
+                let found = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+                all[(*row, *column)] = if found.is_finite() { found.clamp(-1.0, 1.0) } else { 0.0 };
+            }
+        }
+        all
     }
 }
 

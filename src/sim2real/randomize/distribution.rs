@@ -1,0 +1,435 @@
+//! Distributions of one number.
+
+use serde::Serialize;
+
+use super::normal::{normal_cdf, normal_quantile};
+
+/// How a number is distributed. Units are those of the parameter it is of; of a relative one, the nominal value.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "distribution", rename_all = "snake_case")]
+pub enum Distribution {
+    /// Always the same.
+    Constant {
+        /// The value.
+        value: f64,
+    },
+    /// Anywhere between two ends alike.
+    Uniform {
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+    /// The logarithm is uniform: each factor is as likely anywhere between the ends, which are above 0.
+    LogUniform {
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+    /// Gaussian. What is drawn lies within [`Distribution::REACH`] standard deviations.
+    Normal {
+        /// Mean.
+        mean: f64,
+        /// Standard deviation.
+        std: f64,
+    },
+    /// Gaussian, given that it lies between two ends: what is beyond is drawn again, not moved to the end.
+    TruncatedNormal {
+        /// Mean before it is cut.
+        mean: f64,
+        /// Standard deviation before it is cut.
+        std: f64,
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+    /// The logarithm is Gaussian.
+    LogNormal {
+        /// Median, above 0.
+        median: f64,
+        /// Standard deviation of the natural logarithm: 0.1 is about 10 %.
+        sigma: f64,
+    },
+    /// One of some values.
+    Choice {
+        /// The values.
+        values: Vec<f64>,
+        /// How often each is drawn, in any unit; empty where all are alike.
+        weights: Vec<f64>,
+    },
+}
+
+/// Why a distribution is none.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DistributionError {
+    /// A number that is none, or infinite.
+    #[error("expected a finite `{key}`, found {found}\nhint: every number of a distribution must be finite")]
+    NotFinite {
+        /// Which.
+        key: &'static str,
+        /// What was found.
+        found: f64,
+    },
+    /// Ends in the wrong order, or in the same place.
+    #[error(
+        "expected `low` below `high`, found {low} and {high}\nhint: swap them; for one value alone say distribution = \"constant\""
+    )]
+    Ends {
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+    /// A number that must be above 0.
+    #[error("expected `{key}` above 0, found {found}\nhint: {hint}")]
+    NotPositive {
+        /// Which.
+        key: &'static str,
+        /// What was found.
+        found: f64,
+        /// What to do.
+        hint: &'static str,
+    },
+    /// Next to nothing of the Gaussian lies between the ends.
+    #[error(
+        "next to nothing of a normal distribution of mean {mean} and std {std} lies between {low} and {high}\nhint: move the ends to where the mean is, or draw uniformly between them"
+    )]
+    NothingWithin {
+        /// Mean.
+        mean: f64,
+        /// Standard deviation.
+        std: f64,
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+    /// Nothing to choose from.
+    #[error("there is nothing to choose from\nhint: values = [1.0, 2.0]")]
+    NoValues,
+    /// Not a weight a value.
+    #[error("expected {values} weights, one a value, found {weights}\nhint: leave `weights` out where all values are alike")]
+    Weights {
+        /// Number of values.
+        values: usize,
+        /// Number of weights.
+        weights: usize,
+    },
+    /// Weights that cannot be.
+    #[error(
+        "expected weights that are not negative and not all 0, found {found}\nhint: a value that is never drawn can be left out"
+    )]
+    Weight {
+        /// The weight, or the sum.
+        found: f64,
+    },
+}
+
+impl Distribution {
+    /// Standard deviations within which a Gaussian is drawn: a number in (0, 1) with 52 bits reaches no further.
+    pub const REACH: f64 = 8.3;
+
+    /// Its name in documents.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Constant { .. } => "constant",
+            Self::Uniform { .. } => "uniform",
+            Self::LogUniform { .. } => "log_uniform",
+            Self::Normal { .. } => "normal",
+            Self::TruncatedNormal { .. } => "truncated_normal",
+            Self::LogNormal { .. } => "log_normal",
+            Self::Choice { .. } => "choice",
+        }
+    }
+
+    /// Holds its numbers to make a distribution.
+    ///
+    /// # Errors
+    /// Numbers that are not finite; ends that are reversed or the same; widths and medians that are not above 0; a Gaussian of
+    /// which nothing lies between the ends; weights that are none.
+    pub fn check(&self) -> Result<(), DistributionError> {
+        for (key, found) in self.numbers() {
+            if !found.is_finite() {
+                return Err(DistributionError::NotFinite { key, found });
+            }
+        }
+        let positive = |key, found: f64, hint| match found > 0.0 {
+            true => Ok(()),
+            false => Err(DistributionError::NotPositive { key, found, hint }),
+        };
+        let wide = "a spread of 0 is distribution = \"constant\"";
+        let ends = |low: f64, high: f64| if low < high { Ok(()) } else { Err(DistributionError::Ends { low, high }) };
+        match self {
+            Self::Constant { .. } => Ok(()),
+            Self::Uniform { low, high } => ends(*low, *high),
+            Self::LogUniform { low, high } => {
+                positive("low", *low, "a logarithm needs ends above 0; say distribution = \"uniform\"")?;
+                ends(*low, *high)
+            }
+            Self::Normal { std, .. } => positive("std", *std, wide),
+            Self::TruncatedNormal { mean, std, low, high } => {
+                positive("std", *std, wide)?;
+                ends(*low, *high)?;
+                let part = normal_cdf((high - mean) / std) - normal_cdf((low - mean) / std);
+                if part < 1e-12 {
+                    return Err(DistributionError::NothingWithin { mean: *mean, std: *std, low: *low, high: *high });
+                }
+                Ok(())
+            }
+            Self::LogNormal { median, sigma } => {
+                positive("median", *median, "a logarithm needs a median above 0; say distribution = \"normal\"")?;
+                positive("sigma", *sigma, wide)
+            }
+            Self::Choice { values, weights } => {
+                if values.is_empty() {
+                    return Err(DistributionError::NoValues);
+                }
+                if !weights.is_empty() && weights.len() != values.len() {
+                    return Err(DistributionError::Weights { values: values.len(), weights: weights.len() });
+                }
+                if let Some(found) = weights.iter().find(|weight| **weight < 0.0) {
+                    return Err(DistributionError::Weight { found: *found });
+                }
+                let sum: f64 = weights.iter().sum();
+                if !weights.is_empty() && (sum <= 0.0 || !sum.is_finite()) {
+                    return Err(DistributionError::Weight { found: sum });
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn numbers(&self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::Constant { value } => vec![("value", *value)],
+            Self::Uniform { low, high } | Self::LogUniform { low, high } => vec![("low", *low), ("high", *high)],
+            Self::Normal { mean, std } => vec![("mean", *mean), ("std", *std)],
+            Self::TruncatedNormal { mean, std, low, high } => {
+                vec![("mean", *mean), ("std", *std), ("low", *low), ("high", *high)]
+            }
+            Self::LogNormal { median, sigma } => vec![("median", *median), ("sigma", *sigma)],
+            Self::Choice { values, weights } => {
+                values.iter().map(|v| ("values", *v)).chain(weights.iter().map(|w| ("weights", *w))).collect()
+            }
+        }
+    }
+
+    /// The least and the largest value that can be drawn.
+    #[must_use]
+    pub fn support(&self) -> [f64; 2] {
+        match self {
+            Self::Constant { value } => [*value, *value],
+            Self::Uniform { low, high } | Self::LogUniform { low, high } | Self::TruncatedNormal { low, high, .. } => {
+                [*low, *high]
+            }
+            Self::Normal { mean, std } => [mean - Self::REACH * std, mean + Self::REACH * std],
+            Self::LogNormal { median, sigma } => {
+                let factor = (Self::REACH * sigma).exp();
+                [median / factor, median * factor]
+            }
+            Self::Choice { values, weights } => {
+                let drawn = values.iter().enumerate().filter(|(k, _)| weights.get(*k).is_none_or(|w| *w > 0.0));
+                drawn.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (_, v)| [low.min(*v), high.max(*v)])
+            }
+        }
+    }
+
+    /// Whether it is told in factors: a way to its values goes by factors too.
+    pub(super) fn by_factors(&self) -> bool {
+        matches!(self, Self::LogUniform { .. } | Self::LogNormal { .. })
+    }
+
+    /// The distribution made ready for many draws.
+    pub(super) fn inverse(&self) -> Inverse {
+        match self {
+            Self::Constant { value } => Inverse::Constant(*value),
+            Self::Uniform { low, high } => Inverse::Uniform { low: *low, high: *high },
+            Self::LogUniform { low, high } => {
+                Inverse::LogUniform { low: *low, high: *high, from: low.ln(), width: high.ln() - low.ln() }
+            }
+            Self::Normal { mean, std } => Inverse::Normal { mean: *mean, std: *std },
+            Self::TruncatedNormal { mean, std, low, high } => {
+                let below = normal_cdf((low - mean) / std);
+                let within = normal_cdf((high - mean) / std) - below;
+                let beyond = normal_cdf(-(high - mean) / std);
+                let above = [beyond, normal_cdf(-(low - mean) / std) - beyond];
+                Inverse::TruncatedNormal { mean: *mean, std: *std, low: *low, high: *high, below, within, above }
+            }
+            Self::LogNormal { median, sigma } => Inverse::LogNormal { mean: median.ln(), sigma: *sigma },
+            Self::Choice { values, weights } => {
+                let weight = |k: usize| weights.get(k).copied().unwrap_or(1.0);
+                let total: f64 = (0..values.len()).map(weight).sum();
+                let mut sum = 0.0;
+                let upto = |k| {
+                    sum += weight(k) / total;
+                    sum
+                };
+                let cumulative = (0..values.len()).map(upto).collect();
+                Inverse::Choice { values: values.clone(), cumulative }
+            }
+        }
+    }
+}
+
+/// From a number in (0, 1) to a value, and from a standard normal one.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Inverse {
+    Constant(f64),
+    Uniform {
+        low: f64,
+        high: f64,
+    },
+    LogUniform {
+        low: f64,
+        high: f64,
+        from: f64,
+        width: f64,
+    },
+    Normal {
+        mean: f64,
+        std: f64,
+    },
+    /// With the part below the lower end, the part within, and the part above the upper end and that within told from above.
+    TruncatedNormal {
+        mean: f64,
+        std: f64,
+        low: f64,
+        high: f64,
+        below: f64,
+        within: f64,
+        above: [f64; 2],
+    },
+    LogNormal {
+        mean: f64,
+        sigma: f64,
+    },
+    Choice {
+        values: Vec<f64>,
+        cumulative: Vec<f64>,
+    },
+}
+
+impl Inverse {
+    /// The value below which a part `u` of all draws lies.
+    #[inline]
+    pub fn at(&self, u: f64) -> f64 {
+        match self {
+            Self::Constant(value) => *value,
+            // Rounding may not lead beyond the ends.
+            Self::Uniform { low, high } => (low + u * (high - low)).clamp(*low, *high),
+            Self::LogUniform { low, high, from, width } => (from + u * width).exp().clamp(*low, *high),
+            Self::Normal { mean, std } => mean + std * normal_quantile(u),
+            Self::TruncatedNormal { mean, std, low, high, below, within, above } => {
+                // Parts near to 1 are told from above: there are no more digits to tell them from below.
+                let part = below + u * within;
+                let [beyond, between] = *above;
+                let z = if part <= 0.5 { normal_quantile(part) } else { -normal_quantile(beyond + (1.0 - u) * between) };
+                (mean + std * z).clamp(*low, *high)
+            }
+            Self::LogNormal { mean, sigma } => (mean + sigma * normal_quantile(u)).exp(),
+            Self::Choice { values, cumulative } => {
+                let at = cumulative.partition_point(|upto| *upto <= u).min(values.len() - 1);
+                values[at]
+            }
+        }
+    }
+
+    /// The value of which the copula says `z`, a standard normal number.
+    #[inline]
+    pub fn at_normal(&self, z: f64) -> f64 {
+        match self {
+            Self::Normal { mean, std } => mean + std * z,
+            Self::LogNormal { mean, sigma } => (mean + sigma * z).exp(),
+            // Nothing is cut off.
+            Self::TruncatedNormal { mean, std, low, high, within, .. } if *within >= 1.0 => {
+                (mean + std * z).clamp(*low, *high)
+            }
+            other => other.at(normal_cdf(z).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all() -> Vec<(Distribution, f64, f64)> {
+        // Each with its mean and standard deviation.
+        let truncated = Distribution::TruncatedNormal { mean: 0.0, std: 1.0, low: 0.0, high: 9.0 };
+        let half = (2.0 / std::f64::consts::PI).sqrt();
+        let (a, b) = (0.5_f64, 2.0_f64);
+        let ln = (b / a).ln();
+        let (m, square) = ((b - a) / ln, (b * b - a * a) / (2.0 * ln));
+        let s2: f64 = 0.04;
+        vec![
+            (Distribution::Constant { value: 3.0 }, 3.0, 0.0),
+            (Distribution::Uniform { low: -1.0, high: 3.0 }, 1.0, 4.0 / 12.0_f64.sqrt()),
+            (Distribution::LogUniform { low: a, high: b }, m, (square - m * m).sqrt()),
+            (Distribution::Normal { mean: 2.0, std: 0.5 }, 2.0, 0.5),
+            (truncated, half, (1.0 - half * half).sqrt()),
+            (Distribution::LogNormal { median: 1.0, sigma: 0.2 }, (s2 / 2.0).exp(), ((s2.exp() - 1.0) * s2.exp()).sqrt()),
+            (Distribution::Choice { values: vec![0.0, 10.0], weights: vec![3.0, 1.0] }, 2.5, 10.0 * (3.0_f64 / 16.0).sqrt()),
+            (Distribution::Choice { values: vec![1.0, 2.0, 3.0], weights: vec![] }, 2.0, (2.0_f64 / 3.0).sqrt()),
+        ]
+    }
+
+    #[test]
+    fn draws_have_the_mean_and_the_spread_and_stay_within_the_support() {
+        for (distribution, mean, std) in all() {
+            distribution.check().unwrap();
+            let inverse = distribution.inverse();
+            let count = 200_000;
+            let values: Vec<f64> = (0..count).map(|k| inverse.at((f64::from(k) + 0.5) / f64::from(count))).collect();
+            let found = values.iter().sum::<f64>() / f64::from(count);
+            let spread = (values.iter().map(|v| (v - found).powi(2)).sum::<f64>() / f64::from(count)).sqrt();
+            assert!((found - mean).abs() < 1e-4 && (spread - std).abs() < 1e-3, "{distribution:?}: {found} {spread}");
+            let [low, high] = distribution.support();
+            let edge = 1.0 / (1_u64 << 53) as f64;
+            for u in [edge, 1.0 - edge] {
+                assert!((low..=high).contains(&inverse.at(u)), "{distribution:?} at {u}");
+            }
+            assert!(values.windows(2).all(|w| w[0] <= w[1]), "{distribution:?} does not rise");
+            for z in [-3.0, -0.2, 0.0, 1.7] {
+                let (by_normal, by_part) = (inverse.at_normal(z), inverse.at(normal_cdf(z)));
+                assert!((by_normal - by_part).abs() < 1e-9, "{distribution:?} at {z}: {by_normal} {by_part}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_far_tail_is_drawn_from_and_not_its_end() {
+        let inverse = Distribution::TruncatedNormal { mean: 0.0, std: 1.0, low: 5.0, high: 7.0 }.inverse();
+        let values: Vec<f64> = (1..1_000).map(|k| inverse.at(f64::from(k) / 1_000.0)).collect();
+        assert!(values.windows(2).all(|w| w[0] < w[1]), "distinct");
+        // The median above 5 of a standard normal: 1 - F(x) = (1 - F(5)) / 2.
+        assert!((values[499] - 5.133).abs() < 2e-3, "{}", values[499]);
+    }
+
+    #[test]
+    fn what_is_no_distribution_is_refused() {
+        use Distribution as D;
+        let refused = |distribution: D, words: &str| {
+            let text = distribution.check().unwrap_err().to_string();
+            assert!(text.contains(words) && text.contains("\nhint: "), "{text}");
+        };
+        refused(D::Uniform { low: 2.0, high: 1.0 }, "found 2 and 1");
+        refused(D::Uniform { low: 2.0, high: 2.0 }, "constant");
+        refused(D::Uniform { low: f64::NAN, high: 2.0 }, "finite `low`");
+        refused(D::Uniform { low: 0.0, high: f64::INFINITY }, "finite `high`");
+        refused(D::LogUniform { low: 0.0, high: 2.0 }, "`low` above 0");
+        refused(D::Normal { mean: 0.0, std: 0.0 }, "`std` above 0");
+        refused(D::Normal { mean: 0.0, std: -1.0 }, "found -1");
+        refused(D::TruncatedNormal { mean: 0.0, std: 1.0, low: 50.0, high: 60.0 }, "next to nothing");
+        refused(D::TruncatedNormal { mean: 0.0, std: 1.0, low: 1.0, high: -1.0 }, "`low` below `high`");
+        refused(D::LogNormal { median: -1.0, sigma: 0.1 }, "median");
+        refused(D::LogNormal { median: 1.0, sigma: 0.0 }, "sigma");
+        refused(D::Choice { values: vec![], weights: vec![] }, "nothing to choose");
+        refused(D::Choice { values: vec![1.0], weights: vec![1.0, 2.0] }, "expected 1 weights");
+        refused(D::Choice { values: vec![1.0], weights: vec![-1.0] }, "found -1");
+        refused(D::Choice { values: vec![1.0], weights: vec![0.0] }, "not all 0");
+        refused(D::Constant { value: f64::NAN }, "finite `value`");
+    }
+}

@@ -1,0 +1,221 @@
+//! From diagnosis to randomization and back, as users meet them: what a diagnosis is sure of is written, drawn, and covers the
+//! recording it came from; and what does not is detected and said.
+
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
+
+mod command_scene;
+
+use std::fs;
+use std::path::Path;
+
+use command_scene::Folder;
+use serde_json::Value;
+use trueup::io::Table;
+
+fn data() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data")
+}
+
+/// A folder with the servo's twin and the first 1,500 rows (6 s) of its recordings.
+fn servo() -> Folder {
+    let source = data().join("servo");
+    let rows = |name: &str| {
+        let text = fs::read_to_string(source.join(name)).unwrap();
+        text.lines().take(1_501).collect::<Vec<_>>().join("\n") + "\n"
+    };
+    let twin = fs::read_to_string(source.join("twin.toml")).unwrap();
+    Folder::with(&[("twin.toml", &twin), ("train.csv", &rows("train.csv")), ("test.csv", &rows("test.csv"))])
+}
+
+/// A folder with the bars of the examples and a run that ends with `more`.
+fn bars(more: &str) -> Folder {
+    let source = data().join("bars");
+    let run = fs::read_to_string(source.join("run.toml")).unwrap();
+    let folder = Folder::with(&[("run.toml", &format!("{run}\n{more}"))]);
+    fs::copy(source.join("bars.parquet"), folder.path("bars.parquet")).unwrap();
+    folder
+}
+
+fn share(coverage: &Value, band: f64) -> f64 {
+    let shares = coverage["within"].as_array().unwrap();
+    shares.iter().find(|one| one["band"].as_f64() == Some(band)).unwrap()["share"].as_f64().unwrap()
+}
+
+#[test]
+fn a_posterior_covers_the_recording_it_came_from_and_one_it_has_not_seen() {
+    let scene = servo();
+    let diagnosed = scene.run("diagnose twin.toml --recording train.csv --holdout test.csv --out found");
+    assert_eq!(diagnosed.0, 0, "{}", diagnosed.2);
+    let trued = String::from_utf8(scene.bytes("found/trued.toml")).unwrap();
+    assert!(trued.contains("[posterior]") && trued.contains("\"coulomb_friction."), "{trued}");
+    for recording in ["train.csv", "test.csv"] {
+        let rolled = scene.json(&format!("rollout found/trued.toml --recording {recording} --draws 200"));
+        assert_eq!(rolled["covered"], true, "{rolled}");
+        let position = &rolled["coverage"][0];
+        let (half, most, nearly_all) = (share(position, 0.5), share(position, 0.95), share(position, 0.99));
+        assert!((0.90..=0.99).contains(&most), "the 95 % band holds {most} of {recording}");
+        assert!((0.4..=0.8).contains(&half) && nearly_all >= most, "the 50 % band holds {half} of {recording}");
+        // The posterior is narrow: its bands are those of the noise, and not of ignorance.
+        let (width, noise) = (position["width"].as_f64().unwrap(), position["noise_floor"].as_f64().unwrap());
+        assert!(width < 2.0 * 2.0 * 1.96 * noise, "the 95 % band is {width} wide, noise {noise}");
+    }
+}
+
+#[test]
+fn draws_that_exclude_the_truth_are_detected_and_said() {
+    let scene = servo();
+    let twin = String::from_utf8(scene.bytes("twin.toml")).unwrap();
+    // The recordings have dry friction of 0.18 N m: these draws have a third of it at most.
+    let prior = "\n[[randomize.parameter]]\nmechanism = \"coulomb_friction\"\nparameter = \"torque\"\n\
+                 distribution = \"uniform\"\nlow = 0.0\nhigh = 0.06\n";
+    fs::write(scene.path("prior.toml"), twin + prior).unwrap();
+    let (code, out, err) = scene.run("rollout prior.toml --recording test.csv --fail-on not_covered --out rolled");
+    assert_eq!(code, 1, "{err}");
+    assert!(out.starts_with("The draws do not cover the recording: "), "{out}");
+    let said = out.replace('\n', " ");
+    assert!(
+        said.contains("lie outside the 99\u{a0}% band, first at t = ") && said.contains("hint: what was recorded"),
+        "{out}"
+    );
+    for file in ["rollout.json", "draws.parquet", "bands.parquet", "report.html"] {
+        assert!(scene.path("rolled").join(file).is_file(), "{file}");
+    }
+    let draws = Table::read(scene.path("rolled/draws.parquet")).unwrap();
+    let torque = draws.floats("coulomb_friction.torque").unwrap();
+    assert!(torque.len() == 200 && torque.iter().flatten().all(|v| (0.0..=0.06).contains(v)));
+    let page = String::from_utf8(scene.bytes("rolled/report.html")).unwrap();
+    assert!(page.contains("not covered") && page.contains("var(--band)") && !page.contains("NaN"));
+    // Nothing is written over without being asked.
+    assert!(scene.refused("rollout prior.toml --recording test.csv --out rolled").contains("--force"));
+}
+
+#[test]
+fn a_rollout_is_the_same_at_any_number_of_threads() {
+    let scene = servo();
+    let twin = String::from_utf8(scene.bytes("twin.toml")).unwrap();
+    fs::write(scene.path("twin.toml"), twin + "\n[randomize]\npreset = [\"physics\", \"actuators\"]\nlevel = 0.3\n")
+        .unwrap();
+    for (threads, out) in [(1, "a"), (3, "b")] {
+        let ran = scene.run(&format!("rollout twin.toml --recording test.csv --draws 40 --out {out} --threads {threads}"));
+        assert_eq!(ran.0, 0, "{}", ran.2);
+    }
+    for file in ["rollout.json", "draws.parquet", "bands.parquet", "report.html"] {
+        assert_eq!(scene.bytes(&format!("a/{file}")), scene.bytes(&format!("b/{file}")), "{file}");
+    }
+}
+
+const EXECUTION: &str = "
+[[randomize.parameter]]
+mechanism = 'half_spread'
+parameter = 'bps'
+distribution = 'log_uniform'
+low = 0.5
+high = 2.0
+relative = true
+[[randomize.parameter]]
+mechanism = 'command_delay'
+parameter = 'seconds'
+distribution = 'uniform'
+low = 0.0
+high = 60.0
+[[randomize.correlation]]
+between = ['half_spread.bps', 'command_delay.seconds']
+coefficient = 0.5
+";
+
+#[test]
+fn a_backtest_is_drawn_and_each_draw_is_what_a_backtest_of_it_is() {
+    let scene = bars(EXECUTION);
+    let found = scene.json("backtest run.toml --draws 40 --out d");
+    let alone = scene.json("backtest run.toml");
+    assert_eq!(found["metrics"], alone["metrics"], "the run as it is written is not touched");
+    let draws = &found["draws"];
+    assert_eq!((draws["draws"].as_u64(), draws["failed"].as_u64()), (Some(40), Some(0)), "{draws}");
+    assert_eq!(draws["figures"]["total_return"]["nominal"], alone["metrics"]["total_return"]);
+    let told = draws["figures"]["total_return"]["quantiles"].as_array().unwrap();
+    let told: Vec<f64> = told.iter().map(|v| v.as_f64().unwrap()).collect();
+    assert!(told.len() == 7 && told.windows(2).all(|w| w[0] <= w[1]) && told[0] < told[6], "{told:?}");
+
+    let table = Table::read(scene.path("d/draws.parquet")).unwrap();
+    let column = |name: &str| table.floats(name).unwrap().iter().map(|v| v.unwrap()).collect::<Vec<f64>>();
+    let (spread, delay, gain) = (column("half_spread.bps"), column("command_delay.seconds"), column("total_return"));
+    assert_eq!(spread.len(), 40);
+    let run = fs::read_to_string(scene.path("run.toml")).unwrap();
+    let run = run.split("[[randomize.parameter]]").next().unwrap().replace("bps = 1.0", &format!("bps = {:?}", spread[7]));
+    let run = format!("{run}\n[[mechanism]]\nname = \"command_delay\"\nseconds = {:?}\n", delay[7]);
+    fs::write(scene.path("seventh.toml"), run).unwrap();
+    assert_eq!(scene.json("backtest seventh.toml")["metrics"]["total_return"].as_f64(), Some(gain[7]));
+
+    let page = String::from_utf8(scene.bytes("d/report.html")).unwrap();
+    assert!(page.contains("Randomized execution") && page.contains("var(--band)") && !page.contains("NaN"));
+}
+
+#[test]
+fn draws_of_a_backtest_are_the_same_at_any_number_of_threads_and_nominal_at_level_0() {
+    let scene = bars(&format!("[randomize]\nlevel = 1.0\n{EXECUTION}"));
+    for (threads, out) in [(1, "a"), (3, "b")] {
+        let ran = scene.run(&format!("backtest run.toml --draws 24 --out {out} --threads {threads}"));
+        assert_eq!(ran.0, 0, "{}", ran.2);
+    }
+    for file in ["run.json", "draws.parquet", "report.html"] {
+        assert_eq!(scene.bytes(&format!("a/{file}")), scene.bytes(&format!("b/{file}")), "{file}");
+    }
+    let run = fs::read_to_string(scene.path("run.toml")).unwrap();
+    fs::write(scene.path("run.toml"), run.replace("level = 1.0", "level = 0.0")).unwrap();
+    let none = scene.json("backtest run.toml --draws 8");
+    for (name, figure) in none["draws"]["figures"].as_object().unwrap() {
+        let all = figure["quantiles"].as_array().unwrap();
+        assert!(all.iter().all(|v| v.as_f64() == figure["nominal"].as_f64()), "{name}: {figure}");
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_with_what_to_do() {
+    let plain = bars("");
+    assert!(plain.refused("backtest run.toml --draws 10").contains("neither [randomize] nor [posterior]"));
+    let within =
+        bars(&EXECUTION.replacen("relative = true", "relative = true\nat = { seconds = 5.0 }", 1).replace("0.5\n", "0.1\n"));
+    let told = within.refused("backtest run.toml --draws 10");
+    // Correlated with what is drawn once, it is refused before anything else.
+    assert!(told.contains("not drawn at the same time"), "{told}");
+    let adds = bars(
+        "[[randomize.parameter]]\nmechanism = 'half_sprad'\nparameter = 'bps'\ndistribution = 'uniform'\nlow = 0.5\nhigh = 2.0\n",
+    );
+    assert!(adds.refused("backtest run.toml --draws 10").contains("did you mean `half_spread`?"));
+    let streamed = bars(EXECUTION);
+    let run = fs::read_to_string(streamed.path("run.toml")).unwrap();
+    fs::write(streamed.path("run.toml"), run.replace("seed = 7", "seed = 7\nstream = true")).unwrap();
+    assert!(streamed.refused("backtest run.toml --draws 10").contains("stream"));
+    let servo = servo();
+    assert!(servo.refused("rollout twin.toml --recording test.csv").contains("neither [randomize] nor [posterior]"));
+    let twin = fs::read_to_string(servo.path("twin.toml")).unwrap();
+    let every = "\n[[randomize.parameter]]\nparameter = \"inertia\"\ndistribution = \"uniform\"\nlow = 0.1\nhigh = 0.12\nat = { steps = 10 }\n";
+    fs::write(servo.path("twin.toml"), twin.clone() + every).unwrap();
+    assert!(servo.refused("rollout twin.toml --recording test.csv").contains("drawn anew within a run"));
+    let impossible = "\n[randomize]\npreset = [\"physics\"]\n[[randomize.correlation]]\nbetween = [\"inertia\", \"viscous_friction\"]\n\
+                      coefficient = 0.9\n[[randomize.correlation]]\nbetween = [\"inertia\", \"coulomb_friction.torque\"]\n\
+                      coefficient = 0.9\n[[randomize.correlation]]\nbetween = [\"viscous_friction\", \"coulomb_friction.torque\"]\n\
+                      coefficient = -0.9\n";
+    fs::write(servo.path("twin.toml"), twin + impossible).unwrap();
+    let told = servo.refused("rollout twin.toml --recording test.csv");
+    assert!(told.contains("not positive definite, its smallest eigenvalue is -0.8"), "{told}");
+}
+
+#[test]
+fn a_trued_run_is_drawn_from_its_posterior() {
+    let scene = bars("");
+    // Orders of a market whose spread is three times what the run assumes.
+    let run = fs::read_to_string(scene.path("run.toml")).unwrap();
+    fs::write(scene.path("real.toml"), run.replace("bps = 1.0", "bps = 3.0")).unwrap();
+    assert_eq!(scene.run("backtest real.toml --out log").0, 0);
+    let diagnosed = scene.run("diagnose run.toml --recording log --out told");
+    assert_eq!(diagnosed.0, 0, "{}", diagnosed.2);
+    let drawn = scene.json("backtest told/trued.toml --draws 40 --out drawn");
+    let spread = &drawn["draws"]["drawn"]["half_spread.bps"];
+    let quantiles: Vec<f64> = spread["quantiles"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+    let trued = spread["nominal"].as_f64().unwrap();
+    // Prices in whole ticks make a spread of 3 bps cost 3.2: that is what the fit finds, and draws lie around it.
+    assert!((2.9..3.5).contains(&trued) && quantiles[0] < trued && trued < quantiles[6], "{spread}");
+    assert!(quantiles[6] - quantiles[0] < 0.5, "{spread}");
+}
