@@ -54,7 +54,7 @@ fn of_one(track: &Track) -> Vec<Change> {
         let (at, end) = (pair[0], pair[1]);
         let factor = (mean_square(at, end) / mean_square(begin, at)).sqrt();
         begin = at;
-        if factor.is_finite() && (factor > FACTOR || factor < 1.0 / FACTOR) {
+        if factor.is_finite() && !(1.0 / FACTOR..=FACTOR).contains(&factor) {
             let (channel, recording) = (track.channel.clone(), track.recording.clone());
             found.push(Change { channel, recording, time: track.time[cut(at)], factor });
         }
