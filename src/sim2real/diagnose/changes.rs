@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn what_is_steady_what_comes_and_goes_and_what_is_noise_has_no_changes() {
         assert_eq!(changes(&[&track(|_| 5.0)]), []);
-        assert_eq!(changes(&[&track(|t| if (t as usize / 3) % 2 == 0 { 2.0 } else { 9.0 })]), []);
+        assert_eq!(changes(&[&track(|t| if (t as usize / 3).is_multiple_of(2) { 2.0 } else { 9.0 })]), []);
         assert_eq!(changes(&[&track(|t| if t > 15.0 { 1.1 } else { 0.4 })]), []);
         assert_eq!(changes(&[&Track { residual: vec![9.0; 20], time: vec![0.0; 20], ..track(|_| 1.0) }]), []);
     }
