@@ -102,14 +102,16 @@ fn checked(file: &[u8], size: u64) -> Option<()> {
         for at in footer.items(blocks, field, BLOCK)? {
             let offset = usize::try_from(footer.i64(at)?).ok()?;
             let length = usize::try_from(footer.i32(at + 8)?).ok()?;
-            let body = file.get(offset.checked_add(length)?..)?;
+            let (begin, body) = (offset.checked_add(length)?, usize::try_from(footer.i64(at + 16)?).ok()?);
+            // What reached beyond it would be one thing in the whole file and another in a part of it.
+            let body = file.get(begin..begin.checked_add(body)?)?;
             message_agrees(Bytes(file.get(offset..offset + length)?), body, size)?;
         }
     }
     Some(())
 }
 
-/// Holds what a message says to its `body`, which reaches to the end of the file.
+/// Holds what a message says to its `body`.
 fn message_agrees(message: Bytes<'_>, body: &[u8], size: u64) -> Option<()> {
     // Since version 0.15 four bytes of ones stand before the length.
     let before = if message.i32(0)? == -1 { 8 } else { 4 };
