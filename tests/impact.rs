@@ -3,6 +3,8 @@
 //! does not know of them, or from what the mid of a tape does that shows them.
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+mod draws;
+
 use std::sync::Arc;
 
 use trueup::market::{
@@ -11,6 +13,8 @@ use trueup::market::{
 };
 use trueup::sim2real::diagnose::{Diagnosis, Verdict, diagnose};
 use trueup::sim2real::{Assembly, Recording, Seed, Timestamp};
+
+use draws::Draws;
 
 const DAILY_VOLUME: f64 = 1e6;
 /// Step of the simulation [s].
@@ -57,25 +61,6 @@ impl Impact {
 
 /// The time over which what is foreseen comes true [s].
 const MINUTE: f64 = 60.0;
-
-/// Draws of a multiplicative congruential generator, from 0 to 1: Park & Miller, with the multiplier 48271.
-struct Draws(u64);
-
-impl Draws {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0 * 48_271 % 2_147_483_647;
-        self.0 as f64 / 2_147_483_647.0
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.uniform()
-    }
-
-    /// The sum of twelve, less six: of variance 1.
-    fn bell(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
 
 /// A child order: the step in which it is decided and filled, its sign and its quantity.
 struct Child {

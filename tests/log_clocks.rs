@@ -1,6 +1,8 @@
 //! Logs whose clock is not that of the tape: what is missing is to be named as with the right clock, and the clock is to be told.
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+mod draws;
+
 use std::sync::Arc;
 
 use trueup::market::{
@@ -10,19 +12,11 @@ use trueup::market::{
 use trueup::sim2real::diagnose::{Diagnosis, Verdict, diagnose};
 use trueup::sim2real::{Assembly, Seed, Timestamp};
 
+use draws::Draws;
+
 /// The way of an order, and that of its report [s].
 const WAY: f64 = 0.2;
 const BACK: f64 = 0.02;
-
-/// Draws of a multiplicative congruential generator, from 0 to 1: Park & Miller, with the multiplier 48271.
-struct Draws(u64);
-
-impl Draws {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0 * 48_271 % 2_147_483_647;
-        self.0 as f64 / 2_147_483_647.0
-    }
-}
 
 fn at(seconds: f64) -> Timestamp {
     Timestamp(1_722_951_000 * Timestamp::NANOS).plus_seconds(seconds)

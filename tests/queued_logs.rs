@@ -2,6 +2,8 @@
 //! filled, and neither the moves that fill them nor others who give up their places are to be taken for it.
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+mod draws;
+
 use std::sync::Arc;
 
 use trueup::market::{
@@ -11,6 +13,8 @@ use trueup::market::{
 use trueup::sim2real::diagnose::{Diagnosis, Verdict, diagnose};
 use trueup::sim2real::{Assembly, Recording, Seed, Timestamp};
 
+use draws::Draws;
+
 /// Time between rounds [s]: in each the quotes may move, somebody may trade, and the client may send an order.
 const ROUND: f64 = 0.25;
 const ROUNDS: usize = 60_000;
@@ -19,25 +23,12 @@ const DISPLAYED: (f64, f64) = (60.0, 240.0);
 /// How long an order waits [rounds].
 const PATIENCE: usize = 240;
 
-/// Draws of a multiplicative congruential generator, from 0 to 1: Park & Miller, with the multiplier 48271.
-struct Draws(u64);
-
-impl Draws {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0 * 48_271 % 2_147_483_647;
-        self.0 as f64 / 2_147_483_647.0
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.uniform()
-    }
-}
-
 /// The client's order that waits.
 struct Waiting {
     number: usize,
     side: Side,
     limit: i64,
+    quantity: f64,
     left: f64,
     ahead: f64,
     until: usize,
@@ -95,8 +86,16 @@ impl Written {
     }
 }
 
+/// Charges `per_share` [currency], to the cent, for all that was filled of an order, beside its first fill.
+fn charge(fills: &mut [LoggedFill], per_share: f64) {
+    for of_order in fills.chunk_by_mut(|a, b| a.order_id == b.order_id) {
+        let filled: f64 = of_order.iter().map(|fill| fill.quantity).sum();
+        of_order[0].fee = (100.0 * per_share * filled).round() / 100.0;
+    }
+}
+
 /// A log of orders that each join a queue in which so many times what is displayed stands ahead of them.
-fn log(times: f64, seed: u64) -> Recording<OrderLog> {
+fn log(times: f64, per_share: f64, seed: u64) -> Recording<OrderLog> {
     let mut draws = Draws(seed);
     let (mut quotes, mut written) = (Quotes::with_depth(1), Written::default());
     let mut bid = 5_000_i64;
@@ -118,7 +117,7 @@ fn log(times: f64, seed: u64) -> Recording<OrderLog> {
             let (number, quantity) = (written.orders.len(), draws.between(20.0, 90.0).round());
             let chance = draws.between(0.8, 1.2);
             let (ahead, until) = ((displayed * (1.0 + (times - 1.0) * chance)).round(), round + PATIENCE);
-            written.waiting = Some(Waiting { number, side, limit, left: quantity, ahead, until });
+            written.waiting = Some(Waiting { number, side, limit, quantity, left: quantity, ahead, until });
             written.orders.push(LoggedOrder {
                 id: number.to_string(),
                 side,
@@ -129,6 +128,7 @@ fn log(times: f64, seed: u64) -> Recording<OrderLog> {
             });
         }
     }
+    charge(&mut written.fills, per_share);
     let instrument = Instrument {
         symbol: "XYZ".into(),
         tick_size: 0.01,
@@ -141,9 +141,9 @@ fn log(times: f64, seed: u64) -> Recording<OrderLog> {
     OrderLog::recording("queues", market, &written.orders, &written.fills).unwrap()
 }
 
-fn diagnosed(times: f64, seed: u64) -> Diagnosis {
+fn diagnosed(log: Recording<OrderLog>) -> Diagnosis {
     let twin = Assembly::new(Execution, MECHANISMS);
-    diagnose(&twin, &[log(times, seed)], &[], Seed(1), &|_, _, _| ()).diagnosis
+    diagnose(&twin, &[log], &[], Seed(1), &|_, _, _| ()).diagnosis
 }
 
 fn names(diagnosis: &Diagnosis) -> Vec<&str> {
@@ -153,7 +153,7 @@ fn names(diagnosis: &Diagnosis) -> Vec<&str> {
 #[test]
 fn places_further_back_are_named_with_how_far() {
     for (times, seed) in [(1.3, 1), (1.8, 2), (3.0, 3)] {
-        let diagnosis = diagnosed(times, seed);
+        let diagnosis = diagnosed(log(times, 0.0, seed));
         assert_eq!((names(&diagnosis), diagnosis.verdict), (vec!["queue_position"], Verdict::Named), "{diagnosis:#?}");
         let ahead = &diagnosis.effects[0].parameters["ahead"];
         println!("ahead {} +- {}, in truth {}: {}", ahead.value, ahead.std, times - 1.0, diagnosis.summary);
@@ -166,7 +166,7 @@ fn places_further_back_are_named_with_how_far() {
 #[test]
 fn orders_that_stand_behind_what_is_displayed_leave_nothing_to_be_told() {
     for seed in [11, 12, 13] {
-        let diagnosis = diagnosed(1.0, seed);
+        let diagnosis = diagnosed(log(1.0, 0.0, seed));
         assert_eq!(names(&diagnosis), [""; 0], "{}", diagnosis.summary);
         // A few hundred fills may be too few to tell what a mid does of itself.
         assert!(matches!(diagnosis.verdict, Verdict::NoMismatch | Verdict::NotExcited), "{}", diagnosis.summary);
@@ -175,8 +175,19 @@ fn orders_that_stand_behind_what_is_displayed_leave_nothing_to_be_told() {
 
 #[test]
 fn that_others_give_up_their_places_is_said_and_not_called_a_mechanism() {
-    let diagnosis = diagnosed(0.4, 21);
+    let diagnosis = diagnosed(log(0.4, 0.0, 21));
     assert_eq!(names(&diagnosis), [""; 0], "{}", diagnosis.summary);
     let notes = &diagnosis.checks.notes;
     assert!(notes.iter().any(|note| note.contains("had not traded: others gave up their places")), "{notes:?}");
+}
+
+#[test]
+fn what_is_charged_for_an_order_beside_its_first_fill_is_named_as_what_it_is() {
+    let log = log(1.0, 0.037, 31);
+    let diagnosis = diagnosed(log);
+    assert_eq!((names(&diagnosis), diagnosis.verdict), (vec!["commission"], Verdict::Named), "{}", diagnosis.summary);
+    let effect = &diagnosis.effects[0];
+    assert_eq!(effect.parameters.keys().collect::<Vec<_>>(), ["per_share"], "{effect:?}");
+    let per_share = &effect.parameters["per_share"];
+    assert!((per_share.value / 0.037 - 1.0).abs() < 0.01, "{per_share:?}");
 }

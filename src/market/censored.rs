@@ -25,12 +25,12 @@ const SETTLED: f64 = 1e-7;
 impl Spread {
     /// Of values between `bounds`, with that `mean` where it is given; none of no values.
     pub fn fit(bounds: &[Bounds], mean: Option<f64>) -> Option<Self> {
-        let count = bounds.len() as f64;
-        let start = bounds.iter().map(|(low, high)| if high.is_finite() { 0.5 * (low + high) } else { *low });
-        let mut spread = Self { mean: mean.unwrap_or(start.sum::<f64>() / count), std: 0.5, log_likelihood: 0.0 };
         if bounds.is_empty() {
             return None;
         }
+        let count = bounds.len() as f64;
+        let start = bounds.iter().map(|(low, high)| if high.is_finite() { 0.5 * (low + high) } else { *low });
+        let mut spread = Self { mean: mean.unwrap_or(start.sum::<f64>() / count), std: 0.5, log_likelihood: 0.0 };
         for _ in 0..STEPS {
             let inside: Vec<Inside> = bounds.iter().map(|bounds| spread.inside(*bounds)).collect();
             let middle = mean.unwrap_or(inside.iter().map(|one| one.mean).sum::<f64>() / count);

@@ -141,6 +141,7 @@ impl OrderLog {
                 rested.push((reported, Traded::Report(reported)));
             }
         }
+        made.sort_by_key(|made| made.order.decided_at);
         // Fills of orders that rest follow from the market, whether or not it shows them.
         let looks = match (shows_own_orders, made.is_empty()) {
             (true, _) => looks(&market.tape, &taken.chain(rested).collect::<Vec<_>>(), tick_size),

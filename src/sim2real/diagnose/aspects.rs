@@ -67,6 +67,8 @@ pub(super) fn joined<T: Twin>(twin: &T, mut first: Answered<T>, mut others: Vec<
         join(&mut whole.diagnosis, outcome.diagnosis);
         join_facts(&mut facts, more);
     }
+    facts.remainder = remainder(&said, verdict);
+    whole.diagnosis.checks.remainder = facts.remainder;
     finish(&mut whole.diagnosis, &facts, verdict);
     whole.diagnosis.checks.notes.extend(unproved);
     Outcome { trued, values, std, correlation, ..whole }
@@ -83,6 +85,15 @@ fn verdict(diagnoses: &[Diagnosis]) -> Verdict {
     let order = [Verdict::Unexplained, Verdict::Ambiguous, Verdict::Named, Verdict::NotExcited];
     let loudest = order.into_iter().find(|verdict| said.contains(verdict));
     loudest.unwrap_or_else(|| diagnoses.first().map(|d| d.verdict).unwrap_or(Verdict::NoMismatch))
+}
+
+/// The part of the misfit that is left: the largest of the aspects that are not explained, or else that of the first in which something is
+/// found. Of a mid, which does most of what it does of itself, much is left whatever is found.
+fn remainder(diagnoses: &[Diagnosis], verdict: Verdict) -> f64 {
+    let left = |d: &Diagnosis| d.checks.remainder;
+    let unexplained = diagnoses.iter().filter(|d| d.verdict == Verdict::Unexplained).map(left).reduce(f64::max);
+    let found = || diagnoses.iter().find(|d| !d.effects.is_empty()).or(diagnoses.first()).map_or(0.0, left);
+    unexplained.filter(|_| verdict == Verdict::Unexplained).unwrap_or_else(found)
 }
 
 /// Takes back what an aspect has found that does not hold on data it has not seen; gives what is to be said of it.
@@ -168,7 +179,6 @@ fn finish(whole: &mut Diagnosis, facts: &Facts, verdict: Verdict) {
 fn join_facts(facts: &mut Facts, more: Facts) {
     facts.tried.extend(more.tried);
     facts.fits.extend(more.fits);
-    facts.remainder = facts.remainder.max(more.remainder);
     facts.dependence = match (facts.dependence.take(), more.dependence) {
         (Some(own), Some(other)) if other.strength > own.strength => Some(other),
         (own, other) => own.or(other),
@@ -194,7 +204,6 @@ fn join(whole: &mut Diagnosis, other: Diagnosis) {
     whole.scores.extend(other.scores);
     let (checks, more) = (&mut whole.checks, other.checks);
     checks.adequacy = checks.adequacy.max(more.adequacy);
-    checks.remainder = checks.remainder.max(more.remainder);
     checks.placebo_p = [checks.placebo_p, more.placebo_p].into_iter().flatten().reduce(f64::max);
     checks.at_bound.extend(more.at_bound);
     checks.not_excited.extend(more.not_excited);

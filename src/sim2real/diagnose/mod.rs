@@ -232,7 +232,7 @@ fn followed<T: Twin>(
         std: inflated(&inquiry, &selection.selected, &trued),
         trued: trued.clone(),
         sampled: twin.clock() != Clock::Event,
-        inexact: verdict::inexact(&inquiry, &selection.selected),
+        inexact: verdict::inexact(&inquiry, &selection),
     };
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
     // What the fit has named already need not be recognized besides.

@@ -51,6 +51,8 @@ const WORSE: f64 = 1.02;
 const HARDLY_THE_LIBRARY: f64 = 0.1;
 /// The same of what does not carry over to held-out data either.
 const LIKELIER_THAN_NOT: f64 = 0.5;
+/// A limit that varies from order to order leaves this part of the squares at most, where it varies by a third of what it takes away.
+const VARIES: f64 = 0.1;
 /// A name less certain than this is ambiguous.
 const CERTAIN: f64 = 0.7;
 
@@ -215,10 +217,17 @@ fn not_excited(scores: &[Score]) -> Vec<String> {
     ids
 }
 
-/// Whether channels without noise are further off than their rounding, and not in a row or two alone.
-pub(super) fn inexact<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> bool {
+/// Whether channels without noise are further off than their rounding, in more than a row or two, and by more than what is named
+/// leaves where it varies from row to row: of the squares the recalibrated twin leaves there, no more than [`VARIES`].
+pub(super) fn inexact<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> bool {
     let exact = |name: &str| inquiry.twin.channels().iter().any(|channel| channel.exact && channel.name == name);
-    let off = selected.misfits.iter().any(|m| exact(&m.channel) && !m.within(ABOVE_THE_NOISE, 1.0));
+    let Selection { recalibrated, selected, .. } = selection;
+    let squares =
+        |channel: &str| recalibrated.misfits.iter().find(|m| m.channel == channel).map_or(0.0, |m| m.sum_of_squares);
+    let off = selected.misfits.iter().any(|m| {
+        let left = m.sum_of_squares > VARIES * squares(&m.channel);
+        exact(&m.channel) && left && !m.within(ABOVE_THE_NOISE, 1.0)
+    });
     let blocks = inquiry.problem(&selected.twin, &inquiry.evidence.compared).blocks();
     let rows = blocks.into_iter().filter(|block| exact(&block.channel)).flat_map(|block| block.range);
     off && rows.filter(|row| selected.fit.residual[*row].abs() > FAR_OFF).count() >= FEW
