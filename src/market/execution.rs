@@ -240,6 +240,7 @@ impl Plant for Execution {
             command: size(orders().map(|order| order.quantity).collect()),
             effort: size(costs.iter().map(|cost| cost.abs()).collect()),
             output: if spread > 0.0 { spread } else { 1.0 },
+            quantum: recordings.iter().filter_map(|recording| recording.stimulus.quantum()).reduce(f64::min),
             delay: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_delay()).collect()),
             age: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_age()).collect()),
             ..Typical::default()

@@ -71,6 +71,7 @@ mod past;
 #[cfg(feature = "io")]
 mod preset;
 mod price_assumption;
+mod quantum;
 mod queue_place;
 mod quote;
 mod rates;

@@ -10,6 +10,7 @@ use super::log_clock::Clocked;
 use super::log_entry::fills_of_orders;
 use super::log_rows::{Made, Outcome, Stamps, made, market_orders, on_tape};
 use super::look::{Look, Traded, looks, market_came, shows_own};
+use super::quantum::quantum;
 use super::queue_place::{Place, Places};
 use super::shown_age::{ShownAge, shown_age};
 use super::{
@@ -348,6 +349,12 @@ impl OrderLog {
     #[must_use]
     pub fn shown_delay(&self) -> Option<f64> {
         self.shown_delay
+    }
+
+    /// The largest number of lots of which all that was filled of an order is a multiple [units], where there is one.
+    #[must_use]
+    pub fn quantum(&self) -> Option<f64> {
+        quantum(self.executed.iter().copied(), self.market.instrument.lot_size)
     }
 
     /// The age of what orders were decided on [s], where the log shows one.

@@ -28,9 +28,16 @@ pub(super) struct Place {
 /// What the places of a log tell.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) enum Places {
-    /// There are too few that are known, or the orders stood where they were thought to.
+    /// The orders stood where they were thought to, or there are too few to ask.
     #[default]
     Silent,
+    /// So many orders were filled at rest, and of no more than so many the place is known.
+    Unknown {
+        /// Orders filled at rest.
+        filled: usize,
+        /// Those whose place is known.
+        known: usize,
+    },
     /// Orders were filled although less had traded than was displayed, on average by this part of it: others ahead of them gave up.
     Early(f64),
     /// More stood ahead than was displayed.
@@ -43,7 +50,8 @@ impl Places {
         let known = orders.iter().zip(fills).filter_map(|(order, fills)| ahead(order, fills, tape, rounding));
         let known: Vec<Ahead> = known.filter(|one| one.most.is_finite() || one.least > TELLING * one.displayed).collect();
         if known.len() < ENOUGH {
-            return Self::Silent;
+            let filled = orders.iter().zip(fills).filter(|(order, fills)| rested(order) && !fills.is_empty()).count();
+            return if filled < ENOUGH { Self::Silent } else { Self::Unknown { filled, known: known.len() } };
         }
         let bounds: Vec<Bounds> = known.iter().map(Ahead::beyond).collect();
         let Some((own, none)) = Spread::fit(&bounds, None).zip(Spread::fit(&bounds, Some(0.0))) else { return Self::Silent };
@@ -67,12 +75,18 @@ impl Places {
 
     /// What a reader should know of them.
     pub fn note(&self) -> Option<String> {
-        let Self::Early(part) = self else { return None };
-        Some(format!(
-            "resting orders were filled although {:.0} % of what was displayed ahead of them had not traded: others gave up their \
-             places, which a queue model says, not a mechanism",
-            100.0 * part
-        ))
+        match self {
+            Self::Silent | Self::Late(_) => None,
+            Self::Unknown { filled, known } => Some(format!(
+                "where orders stood in their queues is not known: of {filled} that were filled at rest {known} tell of it; to the \
+                 others the market came before what was displayed ahead of them had traded, or the tape does not show what had"
+            )),
+            Self::Early(part) => Some(format!(
+                "resting orders were filled although {:.0} % of what was displayed ahead of them had not traded: others gave up their \
+                 places, which a queue model says, not a mechanism",
+                100.0 * part
+            )),
+        }
     }
 }
 
@@ -95,10 +109,14 @@ impl Ahead {
     }
 }
 
+fn rested(order: &LoggedOrder) -> bool {
+    matches!(&order.kind, OrderType::Other(kind) if kind == "limit")
+}
+
 /// What stood ahead of `order`, which joined the best price of its own side: all that was taken there before somebody filled it.
 /// Where the market left that price first, no less than was taken until then.
 fn ahead(order: &LoggedOrder, fills: &[&LoggedFill], tape: &Tape, rounding: i64) -> Option<Ahead> {
-    let first = fills.first().filter(|_| order.kind == OrderType::Other("limit".to_owned()))?;
+    let first = fills.first().filter(|_| rested(order))?;
     let (limit, decided) = (first.price, order.decided_at);
     let book = tape.book(Seen::at(decided))?;
     let joined = book.opposite(order.side.opposite()).first().filter(|level| close(level.price, limit))?;
@@ -216,5 +234,16 @@ mod tests {
             let known = bounds(&crossed, &[(2.0, 50.0), (3.0, 15.0)], &filled(3.0, 10.0));
             assert_eq!(known, Some((50.0, f64::INFINITY)), "{ask}");
         }
+    }
+    #[test]
+    fn that_places_are_not_known_is_said_where_many_orders_were_filled() {
+        let tape = tape(&[(0.0, 100.01), (2.5, 100.0), (20.0, 100.0)], &[]);
+        let fill = filled(3.0, 30.0);
+        let of = |count: usize| Places::of(&vec![order(); count], &vec![vec![&fill]; count], &tape, 0);
+        assert_eq!(of(40), Places::Unknown { filled: 40, known: 0 });
+        assert!(of(40).note().is_some_and(|note| note.contains("of 40 that were filled at rest 0 tell of it")));
+        assert_eq!(of(3), Places::Silent);
+        let market = LoggedOrder { kind: OrderType::Market, ..order() };
+        assert_eq!(Places::of(&vec![market; 40], &vec![vec![&fill]; 40], &tape, 0), Places::Silent);
     }
 }

@@ -11,7 +11,8 @@ use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site,
 /// lost soon after, not a price that was traded at. Orders that take pay nothing here.
 ///
 /// In a log of orders that rested the law says what the mid does after their fills: against them by `bps`, of which all but
-/// `exp(-t / seconds)` has come after a time t. Where the orders of a log are all alike, what they foresaw cannot be told from
+/// `exp(-t / seconds)` has come after a time t. There it is never negative: a price that comes back after the trade that reached the
+/// order does so after any trade, and is no selection. Where the orders of a log are all alike, what they foresaw cannot be told from
 /// what they suffered.
 ///
 /// Source: Glosten & Milgrom, "Bid, ask and transaction prices in a specialist market with heterogeneously informed traders",
@@ -37,11 +38,11 @@ impl Mechanism<Execution> for AdverseSelection {
     }
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
-        let bps = || Parameter::new("bps", "bps", 0.0).within(-100.0, 1_000.0).starting_at(&[0.5, 2.0, 10.0]);
+        let bps = |least: f64| Parameter::new("bps", "bps", 0.0).within(least, 1_000.0).starting_at(&[0.5, 2.0, 10.0]);
         let seconds = Parameter::new("seconds", "s", 0.0).within(0.0, 60.0).starting_at(&[0.1, 1.0, 5.0]);
         vec![
-            Form { name: "", parameters: vec![bps()] },
-            Form { name: "shown", parameters: vec![bps().proportional(), seconds] },
+            Form { name: "", parameters: vec![bps(-100.0)] },
+            Form { name: "shown", parameters: vec![bps(0.0).proportional(), seconds] },
         ]
     }
 

@@ -27,7 +27,9 @@ impl Mechanism<Execution> for LotSize {
     }
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
-        let starts: Vec<f64> = [1.0, 10.0, 100.0, 1_000.0].into_iter().filter(|lot| *lot <= 3.0 * typical.command).collect();
+        // Between the lots that explain what was filled are many that nearly do: a search that begins beside the lot ends beside it.
+        let round = [1.0, 10.0, 100.0, 1_000.0].into_iter().filter(|lot| *lot <= 3.0 * typical.command);
+        let starts: Vec<f64> = typical.quantum.into_iter().chain(round).collect();
         let starts = if starts.is_empty() { vec![0.3 * typical.command] } else { starts };
         Form::only(vec![Parameter::new("lot", "unit", 0.0).within(0.0, f64::INFINITY).starting_at(&starts).stepped()])
     }

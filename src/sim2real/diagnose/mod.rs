@@ -33,6 +33,7 @@ mod rivals;
 mod screen;
 mod select;
 mod structure;
+mod uncertainty;
 mod verdict;
 mod weigh;
 mod whiteness;
@@ -56,8 +57,7 @@ use prove::Contest;
 use rivals::Place;
 use select::Selection;
 
-use super::identify::Fit;
-use super::{Candidate, ChannelWeight, Clock, Parameter, Recording, Seed, Signs, Twin};
+use super::{Candidate, ChannelWeight, Clock, Recording, Seed, Signs, Twin};
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
@@ -229,7 +229,7 @@ fn followed<T: Twin>(
         remainder: remainder::remainder(&inquiry, &selection),
         dependence: remainder::dependence(&inquiry, &selection.selected),
         foretold: remainder::foretold(&inquiry, &selection.selected),
-        std: inflated(&inquiry, &selection.selected, &trued),
+        std: uncertainty::inflated(&inquiry, &selection.selected, &trued),
         trued: trued.clone(),
         sampled: twin.clock() != Clock::Event,
         inexact: verdict::inexact(&inquiry, &selection),
@@ -315,7 +315,7 @@ pub fn calibrate<T: Twin>(
     let contest = Contest { nominal: (twin, &given), recalibrated: (twin, &fit.values), trued: (twin, &fit.values) };
     let comparisons = prove::compared(&contest, &evidence, seed);
     Calibration {
-        std: inflated(&inquiry, &hypothesis, &fit),
+        std: uncertainty::inflated(&inquiry, &hypothesis, &fit),
         correlation: fit.correlation(twin.parameters()),
         at_bound: fit.at_bound.iter().map(|k| twin.parameters()[*k].name.clone().into_owned()).collect(),
         values: fit.values,
@@ -331,31 +331,3 @@ fn noise_of<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> Ve
     let weights = inquiry.evidence.weights.iter();
     weights.map(|w| ChannelWeight { channel: w.channel.clone(), noise: w.noise * level(&w.channel).sqrt() }).collect()
 }
-
-/// Standard deviations as the residuals make them, rather than white noise of the noise floor's size: misfit and
-/// autocorrelation both widen them.
-fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, fit: &Fit) -> Vec<f64> {
-    let parts = if inquiry.evidence.window.is_some() { &inquiry.evidence.free_run } else { &inquiry.evidence.compared };
-    let blocks = inquiry.problem(&hypothesis.twin, parts).blocks();
-    let factor = whiteness::channel_misfits(fit.residual.as_slice(), &blocks, |c| inquiry.evidence.rounding_of(c))
-        .iter()
-        .map(|m| (m.sum_of_squares / m.count.max(1) as f64).max(1.0) * m.autocorrelation_time.max(1.0))
-        .fold(1.0, f64::max)
-        .sqrt();
-    let own = inquiry.twin.parameters().len();
-    let parameters = hypothesis.twin.parameters().iter().enumerate();
-    let widened = |(k, p): (usize, &Parameter)| {
-        let std = fit.std[k] * factor;
-        // Of messages the laws are known better: what is charged is charged by a rule.
-        let of_another_form = k >= own && std > 0.0 && inquiry.twin.clock() != Clock::Event;
-        let relative = if p.unit == "s" { 0.0 } else { FORM * fit.values[k].abs() };
-        if of_another_form { (BEYOND_NOISE * std).hypot(relative) } else { std }
-    };
-    parameters.map(widened).collect()
-}
-
-/// What the constants of laws are off by because the real thing has another form, as a part of them, but for times: ...
-const FORM: f64 = 0.04;
-/// ... and by how much more than noise makes them. With both, among right names of the blind benchmark's development seeds, the
-/// intervals hold the truth as often as they say.
-const BEYOND_NOISE: f64 = 2.0;
