@@ -77,9 +77,9 @@ impl Traded {
     }
 }
 
-/// When the market had come to the price of a fill that was reported at a time, if it came with it: what the mid did until then is why
-/// an order that rested was filled, and nothing that followed from it.
-pub(super) fn market_came(tape: &Tape, made: &Made, reported: Timestamp) -> Option<Timestamp> {
+/// When the market came to the price of a fill that was reported at a time, if it came with it, and when it had come: what the mid did
+/// until then is why an order that rested was filled, and nothing that followed from it.
+pub(super) fn market_came(tape: &Tape, made: &Made, reported: Timestamp) -> Option<[Timestamp; 2]> {
     let times = tape.quotes().times();
     let rounding = if reported.0 % Timestamp::NANOS == 0 { Timestamp::NANOS } else { 1 };
     let end = times.partition_point(|at| at.0 < reported.0 + rounding);
@@ -92,7 +92,7 @@ pub(super) fn market_came(tape: &Tape, made: &Made, reported: Timestamp) -> Opti
     };
     let came = (0..quotes.len()).find(comes).and_then(|k| quotes.times().get(k).copied());
     // A look before it comes a nanosecond earlier, and sees the quote.
-    came.map(|at| Timestamp(at.0 + 2).max(reported))
+    came.map(|at| [at, Timestamp(at.0 + 2).max(reported)])
 }
 
 /// The looks at the mid of `tape` that tell what it does after `orders`, each with when it was decided and when it traded, in order

@@ -79,6 +79,7 @@ mod reason;
 mod recent;
 pub mod reconcile;
 pub mod response;
+mod reversal;
 mod row_check;
 #[cfg(feature = "io")]
 mod run;

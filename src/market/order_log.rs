@@ -12,6 +12,7 @@ use super::log_rows::{Made, Outcome, Stamps, made, market_orders, on_tape};
 use super::look::{Look, Traded, looks, market_came, shows_own};
 use super::quantum::quantum;
 use super::queue_place::{Place, Places};
+use super::reversal::{Came, discount};
 use super::shown_age::{ShownAge, shown_age};
 use super::{
     InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, PriceAssumption, Role, Seen, Tape, cost_bps, fee_bps,
@@ -106,6 +107,7 @@ impl OrderLog {
         let Clocked { orders, fills } = Clocked::of(orders, fills, &of_order, &market.tape, early, &mut notes);
         let (orders, fills) = (orders.as_ref(), fills.as_ref());
         let of_order = fills_of_orders(orders, fills)?;
+        let own: Vec<Timestamp> = fills.iter().map(|fill| fill.filled_at).collect();
         let mut made = made(orders, &of_order, &market.tape);
         let places = Places::of(orders, &of_order, &market.tape, early);
         notes.extend(places.note());
@@ -132,10 +134,11 @@ impl OrderLog {
         let found_out = || shows_own(&market.tape, &in_flight, &traded, tick_size);
         let shows_own_orders = market.shows_own_orders.unwrap_or_else(found_out);
         let taken = traded.iter().copied();
-        let mut rested = Vec::with_capacity(made.len());
+        let (mut rested, mut brought) = (Vec::with_capacity(made.len()), Vec::new());
         for made in &mut made {
             let reported = early(made.order.decided_at);
-            if let Some(came) = market_came(&market.tape, made, reported) {
+            if let Some([at, came]) = market_came(&market.tape, made, reported) {
+                brought.extend(Came::at(&market.tape, at));
                 made.order.decided_at = came.max(made.order.decided_at);
                 rested.push((came, Traded::Report(reported)));
             } else {
@@ -144,11 +147,12 @@ impl OrderLog {
         }
         made.sort_by_key(|made| made.order.decided_at);
         // Fills of orders that rest follow from the market, whether or not it shows them.
-        let looks = match (shows_own_orders, made.is_empty()) {
+        let mut looks = match (shows_own_orders, made.is_empty()) {
             (true, _) => looks(&market.tape, &taken.chain(rested).collect::<Vec<_>>(), tick_size),
             (false, false) => looks(&market.tape, &rested, tick_size),
             (false, true) => Vec::new(),
         };
+        discount(&mut looks, &market.tape, brought, own);
         let mut log = Self {
             rows: (0..in_flight.len()).map(Row::Order).collect(),
             executed: executions.iter().map(|execution| execution.quantity).collect(),
