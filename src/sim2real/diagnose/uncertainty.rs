@@ -1,6 +1,7 @@
 //! How well what was fitted is known: as the residuals make it, and as laws of another form would.
 
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::verdict::ABOVE_THE_NOISE;
 use super::whiteness;
 use crate::sim2real::identify::{Block, Fit};
 use crate::sim2real::{Clock, Parameter, Twin};
@@ -35,11 +36,13 @@ pub(super) fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesi
     parameters.map(widened).collect()
 }
 
-/// The parameters that nothing depends on but channels without noise: what is charged is charged by a rule.
+/// The parameters that nothing depends on but channels without noise, where these are explained to within their rounding: what is
+/// charged is charged by a rule.
 fn exact<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, fit: &Fit) -> Vec<usize> {
     let channels = inquiry.twin.channels();
     let exact = |name: &str| channels.iter().any(|channel| channel.exact && channel.name == name);
-    if !channels.iter().any(|channel| channel.exact) {
+    let loose = hypothesis.misfits.iter().any(|misfit| exact(&misfit.channel) && !misfit.within(ABOVE_THE_NOISE, 1.0));
+    if loose || !channels.iter().any(|channel| channel.exact) {
         return Vec::new();
     }
     let problem = inquiry.problem(&hypothesis.twin, &inquiry.evidence.compared);

@@ -32,7 +32,7 @@ const FORETOLD_WELL: f64 = 0.25;
 /// anything foretells what is left.
 const FAR_ABOVE_THE_NOISE: f64 = 9.0;
 /// A twin to which nothing can be added and whose mean squared residual is this many times the noise lacks something unknown.
-const ABOVE_THE_NOISE: f64 = 2.0;
+pub(super) const ABOVE_THE_NOISE: f64 = 2.0;
 /// What a regression foretells counts where the mean squared residual is more than this many times the noise.
 const HARDLY_ABOVE: f64 = 1.2;
 /// A row of a channel without noise is off by more than this, in roundings, and more rows than one are, where something is missing.
