@@ -3,6 +3,7 @@
 //! Results go to standard output; progress and what went wrong go to standard error. Exit codes: 0 done, 1 a finding the
 //! caller asked to fail on, 2 bad input, 3 a bug.
 
+mod answer;
 mod audit;
 mod backtest;
 mod calibrate;
@@ -30,6 +31,9 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+pub use answer::{Answer, Listener, Refusal, answer};
+pub use backtest::strategy as strategy_of_run;
 
 use screen::Screen;
 use stop::{Outcome, Stop};
