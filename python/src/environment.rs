@@ -1,5 +1,8 @@
 //! Environments as Python steps them: lanes behind a driver that checks all it is given, writing into arrays of NumPy.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArray1, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
@@ -10,6 +13,7 @@ use trueup::rl::{
 };
 
 use crate::error;
+use crate::work::words;
 
 /// Lanes from which on a step goes without Python's lock: below, to give it back costs more than the step.
 const MANY: usize = 64;
@@ -29,12 +33,35 @@ fn refused(py: Python<'_>, error: &EnvError) -> PyErr {
     error::told(py, error)
 }
 
+type Driver = Checked<Box<dyn VecEnv>>;
+
 /// Lanes of an environment.
 #[pyclass(module = "trueup._trueup")]
 pub struct Lanes {
-    driver: Checked<Box<dyn VecEnv>>,
+    /// Whoever steps has it alone and never waits; the lock is for those who only look.
+    driver: Mutex<Driver>,
     lanes: usize,
     size: usize,
+}
+
+impl Lanes {
+    fn looked_at(&self) -> MutexGuard<'_, Driver> {
+        self.driver.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn driven(&mut self) -> &mut Driver {
+        self.driver.get_mut().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Drives lanes, without Python's lock where there are many. A panic is a bug, and an exception.
+fn drive(py: Python<'_>, driver: &mut Driver, job: impl FnOnce(&mut Driver) -> Result<(), EnvError> + Send) -> PyResult<()> {
+    let caught = |driver: &mut Driver| catch_unwind(AssertUnwindSafe(|| job(driver)));
+    let done = if driver.lanes() < MANY { caught(driver) } else { py.detach(|| caught(driver)) };
+    match done {
+        Ok(done) => done.map_err(|error| refused(py, &error)),
+        Err(payload) => Err(error::bug(py, &words(payload.as_ref()))),
+    }
 }
 
 #[pymethods]
@@ -62,12 +89,12 @@ impl Lanes {
         });
         let driver = made.and_then(|env| Checked::new(env, mode)).map_err(|error| refused(py, &error))?;
         let size = driver.about().observation.size();
-        Ok(Self { driver, lanes, size })
+        Ok(Self { driver: Mutex::new(driver), lanes, size })
     }
 
     /// What the environment is: spaces, info channels, options.
     fn about<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        about(py, self.driver.about())
+        about(py, self.looked_at().about())
     }
 
     /// Begins an episode in the lanes of `mask`, all if there is none, with `seeds`, one a lane, or else the next of the seeds they
@@ -87,9 +114,7 @@ impl Lanes {
             Some(mask) => Which::Mask(mask.as_slice().map_err(|_| scattered(py, "the mask"))?),
         };
         let observations = observations.as_slice_mut().map_err(|_| scattered(py, "observations"))?;
-        let driver = &mut self.driver;
-        let done = py.detach(|| driver.reset(which, seeds.as_deref(), &options, observations));
-        done.map_err(|error| refused(py, &error))
+        drive(py, self.driven(), |driver| driver.reset(which, seeds.as_deref(), &options, observations))
     }
 
     /// A step by `actions`, real numbers as float32, choices as int64, which writes what comes of it into the arrays.
@@ -108,24 +133,24 @@ impl Lanes {
             terminated: terminated.as_slice_mut().map_err(|_| scattered(py, "terminated"))?,
             truncated: truncated.as_slice_mut().map_err(|_| scattered(py, "truncated"))?,
         };
-        let done = if let Ok(actions) = actions.extract::<PyReadonlyArrayDyn<'_, f32>>() {
+        if let Ok(actions) = actions.extract::<PyReadonlyArrayDyn<'_, f32>>() {
             let actions = Actions::Continuous(actions.as_slice().map_err(|_| scattered(py, "actions"))?);
-            stepped(py, &mut self.driver, actions, &mut out)
+            drive(py, self.driven(), |driver| driver.step(actions, &mut out))
         } else if let Ok(actions) = actions.extract::<PyReadonlyArrayDyn<'_, i64>>() {
             let actions = Actions::Discrete(actions.as_slice().map_err(|_| scattered(py, "actions"))?);
-            stepped(py, &mut self.driver, actions, &mut out)
+            drive(py, self.driven(), |driver| driver.step(actions, &mut out))
         } else {
-            return Err(error::refused(py, "actions are no array of float32 or int64", "give one row a lane"));
-        };
-        done.map_err(|error| refused(py, &error))
+            Err(error::refused(py, "actions are no array of float32 or int64", "give one row a lane"))
+        }
     }
 
     /// Values of the info channels, one a lane each, by name.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let infos = PyDict::new(py);
-        for (channel, about) in self.driver.about().info.iter().enumerate() {
+        let driver = self.looked_at();
+        for (channel, about) in driver.about().info.iter().enumerate() {
             let values = PyArray1::<f64>::zeros(py, self.lanes, false);
-            self.driver
+            driver
                 .info(channel, values.readwrite().as_slice_mut().map_err(|_| scattered(py, "info"))?)
                 .map_err(|error| refused(py, &error))?;
             infos.set_item(&about.name, values)?;
@@ -136,11 +161,12 @@ impl Lanes {
     /// Of the lanes whose episodes ended in the step before and have begun the next in it: which they are (lanes,), what was observed
     /// last (lanes, size), and info by name (lanes,). None where there are none.
     fn finals<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let Some(finals) = self.driver.finals() else { return Ok(None) };
+        let driver = self.looked_at();
+        let Some(finals) = driver.finals() else { return Ok(None) };
         let ended = PyArray1::from_slice(py, finals.ended);
         let observations = PyArray1::from_slice(py, finals.observations);
         let infos = PyDict::new(py);
-        for (about, values) in self.driver.about().info.iter().zip(finals.info.chunks_exact(self.lanes)) {
+        for (about, values) in driver.about().info.iter().zip(finals.info.chunks_exact(self.lanes)) {
             infos.set_item(&about.name, PyArray1::from_slice(py, values))?;
         }
         let observations = observations.reshape([self.lanes, self.size])?;
@@ -149,11 +175,12 @@ impl Lanes {
 
     /// Values of the parameters that are drawn and not observed, shape (lanes, parameters).
     fn privileged<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let count = self.driver.about().privileged.len();
+        let driver = self.looked_at();
+        let count = driver.about().privileged.len();
         let mut rows = vec![vec![0.0; count]; self.lanes];
         let mut values = vec![0.0; self.lanes];
         for parameter in 0..count {
-            self.driver.env().privileged(parameter, &mut values);
+            driver.env().privileged(parameter, &mut values);
             rows.iter_mut().zip(&values).for_each(|(row, value)| row[parameter] = *value);
         }
         if count == 0 {
@@ -163,38 +190,28 @@ impl Lanes {
     }
 
     /// The same lanes once more, which go on with the same bits.
-    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
-        let _ = py;
-        Ok(Self { driver: self.driver.clone(), lanes: self.lanes, size: self.size })
+    fn copy(&self) -> Self {
+        Self { driver: Mutex::new(self.looked_at().clone()), lanes: self.lanes, size: self.size }
     }
 
     /// Makes lane `to` a copy of lane `from`.
     fn copy_lane(&mut self, py: Python<'_>, from: usize, to: usize) -> PyResult<()> {
-        self.driver.copy_lane(from, to).map_err(|error| refused(py, &error))
+        self.driven().copy_lane(from, to).map_err(|error| refused(py, &error))
     }
 
     /// Makes lane `to` a copy of lane `from` of other lanes of the same kind.
     fn copy_lane_from(&mut self, py: Python<'_>, other: &Self, from: usize, to: usize) -> PyResult<()> {
-        self.driver.copy_lane_from(&other.driver, from, to).map_err(|error| refused(py, &error))
+        self.driven().copy_lane_from(&other.looked_at(), from, to).map_err(|error| refused(py, &error))
     }
 
     fn close(&mut self) {
-        self.driver.close();
+        self.driven().close();
     }
 
     #[getter]
     fn closed(&self) -> bool {
-        self.driver.closed()
+        self.looked_at().closed()
     }
-}
-
-fn stepped(
-    py: Python<'_>,
-    driver: &mut Checked<Box<dyn VecEnv>>,
-    actions: Actions<'_>,
-    out: &mut Out<'_>,
-) -> Result<(), EnvError> {
-    if driver.lanes() < MANY { driver.step(actions, out) } else { py.detach(|| driver.step(actions, out)) }
 }
 
 fn scattered(py: Python<'_>, what: &str) -> PyErr {

@@ -5,6 +5,7 @@
 
 mod backtest;
 mod command;
+mod environment;
 mod error;
 mod orders;
 mod simulator;
@@ -30,6 +31,8 @@ fn _trueup(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(table::columns_of, module)?)?;
     module.add_function(wrap_pyfunction!(table::read_columns, module)?)?;
     module.add_function(wrap_pyfunction!(table::write_columns, module)?)?;
+    module.add_function(wrap_pyfunction!(environment::environments, module)?)?;
+    module.add_class::<environment::Lanes>()?;
     module.add_class::<table::Table>()?;
     module.add_class::<backtest::Outputs>()?;
     module.add_class::<view::Sight>()?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
-use arrow_array::ffi_stream::{ArrowArrayStreamReader, FFI_ArrowArrayStream};
+use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow_array::{
     Array, ArrayRef, ArrowPrimitiveType, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray,
     TimestampNanosecondArray, types,
@@ -102,7 +102,7 @@ impl Table {
     ) -> PyResult<Bound<'py, PyCapsule>> {
         let _ = requested_schema;
         let reader = RecordBatchIterator::new([Ok(self.batch.clone())], self.batch.schema());
-        PyCapsule::new(py, FFI_ArrowArrayStream::new(Box::new(reader)), Some(STREAM.to_owned()))
+        PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(reader)), STREAM)
     }
 }
 
@@ -144,7 +144,7 @@ pub fn columns_of<'py>(py: Python<'py>, table: &Bound<'py, PyAny>) -> PyResult<B
     // SAFETY: whoever implements the interface promises that a capsule of this name holds a valid stream; the reader moves it out
     // and leaves a released one behind, which the capsule's destructor does not release again.
     #[allow(unsafe_code)]
-    let reader = unsafe { ArrowArrayStreamReader::from_raw(stream.as_ptr().cast()) };
+    let reader = unsafe { RecordBatchStreamReader::from_raw(stream.as_ptr().cast()) };
     let unreadable = |error: ArrowError| error::refused(py, &format!("the Arrow stream cannot be read ({error})"), "is it whole?");
     let reader = reader.map_err(unreadable)?;
     let schema = reader.schema();

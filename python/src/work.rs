@@ -1,5 +1,6 @@
 //! Long work: without Python's lock, and ended by Ctrl-C.
 
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -102,7 +103,7 @@ fn waited<T: Send>(course: &Course, work: impl FnOnce(&Course) -> T + Send) -> (
         });
         let worker = match worker {
             Ok(worker) => worker,
-            Err(error) => return (Err(Box::new(error.to_string())), None),
+            Err(error) => return (Err(Box::new(error.to_string()) as Box<dyn Any + Send>), None),
         };
         let mut signal = None;
         while matches!(ended.recv_timeout(LOOK), Err(RecvTimeoutError::Timeout)) {
@@ -116,7 +117,7 @@ fn waited<T: Send>(course: &Course, work: impl FnOnce(&Course) -> T + Send) -> (
 }
 
 /// What a panic said.
-fn words(payload: &(dyn std::any::Any + Send)) -> String {
+pub fn words(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "a panic without words".to_owned())
 }
