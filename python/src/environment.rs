@@ -20,7 +20,7 @@ const MANY: usize = 64;
 
 /// The environments that can be made by their ids.
 fn entries() -> impl Iterator<Item = &'static EnvEntry> {
-    trueup::robot::ENVIRONMENTS.iter().chain(trueup::market::ENVIRONMENTS)
+    std::iter::empty()
 }
 
 /// Ids of the environments, each with what has to be done in it.
