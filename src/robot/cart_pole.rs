@@ -6,7 +6,8 @@ use super::mover::{Motion, Mover, Push};
 use super::runge_kutta::{Contact, step_with_friction};
 use super::signal::{Commands, Signal};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
+    Typical,
 };
 
 /// A cart of mass `M` at `x`, driven by `gain u`, with a uniform pole of mass `m` and half length `l` hinged on it, at the
@@ -254,6 +255,12 @@ impl Mover for CartPole {
     }
 }
 
+impl LaneDynamics<CartPole> for CartPoleDynamics {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.lanes, |values| Lane::of(std::array::from_fn(|k| values[k])));
+    }
+}
+
 impl Dynamics<CartPole> for CartPoleDynamics {
     fn initial(&self, initial: &Thetas) -> Vec<[f64; 4]> {
         (0..initial.lanes()).map(|lane| std::array::from_fn(|k| initial.row(k)[lane])).collect()
@@ -278,7 +285,7 @@ impl Dynamics<CartPole> for CartPoleDynamics {
 mod tests {
     use super::*;
     use crate::robot::CART_POLE_MECHANISMS;
-    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_mechanism, check_plant};
+    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_lanes, check_mechanism, check_plant};
 
     const VALUES: [f64; 7] = [1.0, 0.1, 0.5, 9.8, 0.3, 0.01, 2.0];
 
@@ -303,6 +310,7 @@ mod tests {
         check_plant(&plant(), CART_POLE_MECHANISMS, &hanging(400)).unwrap();
         for mechanism in CART_POLE_MECHANISMS {
             check_mechanism(*mechanism, &plant(), CART_POLE_MECHANISMS, &hanging(800)).unwrap();
+            check_lanes(*mechanism, &plant(), CART_POLE_MECHANISMS, &hanging(800)).unwrap();
         }
     }
 

@@ -5,7 +5,8 @@ use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
 use super::sine::{sine, sines};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
+    Typical,
 };
 
 /// `inertia a + viscous_friction v + gravity_torque sin(q) = gain u`.
@@ -270,6 +271,17 @@ impl Lane {
         let velocity = if held > 0.0 { rubbed(state.velocity, free, held) } else { free };
         state.position = midway + half * velocity;
         state.velocity = velocity;
+    }
+}
+
+impl LaneDynamics<Joint> for JointDynamics {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.lanes, |values| Lane {
+            inertia: values[0],
+            viscous_friction: values[1],
+            gravity_torque: values[2],
+            gain: values[3],
+        });
     }
 }
 

@@ -4,7 +4,8 @@ use super::estimate::{local, motion, rounding, typical};
 use super::runge_kutta::step;
 use super::signal::{Commands, Signal};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
+    Typical,
 };
 
 /// Levels of the two tanks, in the unit of the lower tank's sensor:
@@ -173,6 +174,12 @@ impl Plant for Tanks {
 #[derive(Debug, Clone)]
 pub struct TanksDynamics {
     lanes: Vec<[f64; 4]>,
+}
+
+impl LaneDynamics<Tanks> for TanksDynamics {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.lanes, |values| std::array::from_fn(|k| values[k]));
+    }
 }
 
 impl Dynamics<Tanks> for TanksDynamics {

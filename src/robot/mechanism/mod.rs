@@ -107,7 +107,7 @@ pub static EQUATIONS_MECHANISMS: Registry<Equations> = rows!(motion, delays OF_A
 mod tests {
     use super::*;
     use crate::robot::{Axis, Commands};
-    use crate::sim2real::{Assembly, Measured, Mechanism, Recording, Seed, Simulator, Thetas, check_mechanism};
+    use crate::sim2real::{Assembly, Measured, Mechanism, Recording, Seed, Simulator, Thetas, check_lanes, check_mechanism};
 
     #[test]
     fn every_row_keeps_the_contract() {
@@ -122,6 +122,7 @@ mod tests {
         let arm = Joint::new(Axis::Rotary, [0.11, 0.25, 2.7, 1.0], [0.2, 0.2, 0.2, 0.0]);
         for mechanism in MECHANISMS {
             check_mechanism(*mechanism, &arm, MECHANISMS, &recording).unwrap();
+            check_lanes(*mechanism, &arm, MECHANISMS, &recording).unwrap();
         }
     }
 

@@ -35,5 +35,6 @@ pub use predictive::{BANDS, BandShare, Bands, Coverage, OUTSIDE, WIDEST, quantil
 pub use preset::{Preset, PresetRow, Presets};
 pub use randomizer::{RandomizeError, Randomizer, Turn};
 pub use stream::Occasion;
+pub(super) use stream::mixed;
 pub use table::DrawTable;
 pub use target::{Implausible, Randomized, Redraw, Target};

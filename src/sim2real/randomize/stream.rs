@@ -31,7 +31,7 @@ pub(super) struct Streams {
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Mixes all bits of `z` into all bits.
-const fn mixed(z: u64) -> u64 {
+pub(in crate::sim2real) const fn mixed(z: u64) -> u64 {
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
