@@ -85,6 +85,13 @@ pub(super) const CREEP_RATE: f64 = 105.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Posture([f64; 2]);
 
+impl Posture {
+    /// That of a motion.
+    pub(super) const fn of(motion: &Motion) -> Self {
+        Self([motion.position, motion.velocity])
+    }
+}
+
 impl AsMut<[f64]> for Posture {
     fn as_mut(&mut self) -> &mut [f64] {
         &mut self.0
@@ -314,7 +321,7 @@ impl Dynamics<Joint> for JointDynamics {
 
     fn observe(&self, states: &[Motion], observations: &mut [Posture]) {
         for (state, observation) in states.iter().zip(observations) {
-            observation.0 = [state.position, state.velocity];
+            *observation = Posture::of(state);
         }
     }
 }

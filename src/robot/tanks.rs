@@ -228,7 +228,7 @@ fn flow(levels: Levels, seconds: f64, pumped: f64, rims: &Rims, parameters: &[f6
 mod tests {
     use super::*;
     use crate::robot::TANKS_MECHANISMS;
-    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_mechanism, check_plant};
+    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_lanes, check_mechanism, check_plant};
 
     const VALUES: [f64; 4] = [0.05, 0.045, 0.055, 0.04];
 
@@ -259,6 +259,7 @@ mod tests {
         recording.stimulus.0.iter_mut().skip(300).for_each(|u| *u = -*u);
         for mechanism in TANKS_MECHANISMS {
             check_mechanism(*mechanism, &tanks(), TANKS_MECHANISMS, &recording).unwrap();
+            check_lanes(*mechanism, &tanks(), TANKS_MECHANISMS, &recording).unwrap();
         }
     }
 

@@ -1,5 +1,8 @@
 //! What happens to one lane of laws that are under way in many: its parameters change, it begins anew, it goes on as another.
 
+use std::any::Any;
+use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::convert::Infallible;
 
 use rand::TryRng;
@@ -24,13 +27,41 @@ pub enum LaneChange<'a> {
         /// What its draws depend on.
         seed: Seed,
     },
-    /// A lane goes on as another is: the same parameters, memory and draws.
-    Copy {
-        /// The other.
-        from: usize,
+    /// Nothing changes, and all that is kept is put into the image: parameters, memory and draws.
+    Save {
         /// The lane.
-        to: usize,
+        lane: usize,
+        /// The image.
+        image: &'a LaneImage,
     },
+    /// The lane goes on as the one that was saved into the image.
+    Load {
+        /// The lane.
+        lane: usize,
+        /// The image.
+        image: &'a LaneImage,
+    },
+}
+
+/// All that is kept of one lane, in the order in which laws show it.
+#[derive(Debug, Default)]
+pub struct LaneImage(RefCell<VecDeque<Box<dyn Any + Send>>>);
+
+impl LaneImage {
+    fn save<T: Clone + Send + 'static>(&self, column: &[T], lane: usize) {
+        if let Some(own) = column.get(lane) {
+            self.0.borrow_mut().push_back(Box::new(own.clone()));
+        }
+    }
+
+    fn load<T: Clone + Send + 'static>(&self, column: &mut [T], lane: usize) {
+        if let Some(own) = column.get_mut(lane)
+            && let Some(kept) = self.0.borrow_mut().pop_front()
+            && let Ok(kept) = kept.downcast::<T>()
+        {
+            *own = *kept;
+        }
+    }
 }
 
 impl LaneChange<'_> {
@@ -40,7 +71,7 @@ impl LaneChange<'_> {
     }
 
     /// `column` has what follows from the parameters of each lane, by `of`.
-    pub fn derived<T: Clone>(&self, column: &mut [T], of: impl FnOnce(&[f64]) -> T) {
+    pub fn derived<T: Clone + Send + 'static>(&self, column: &mut [T], of: impl FnOnce(&[f64]) -> T) {
         match *self {
             Self::Retune { lane, values } => {
                 if let Some(own) = column.get_mut(lane) {
@@ -48,12 +79,13 @@ impl LaneChange<'_> {
                 }
             }
             Self::Forget { .. } => {}
-            Self::Copy { from, to } => copy(column, from, to),
+            Self::Save { lane, image } => image.save(column, lane),
+            Self::Load { lane, image } => image.load(column, lane),
         }
     }
 
     /// `column` has what is remembered of each lane; the default is nothing.
-    pub fn memory<T: Clone + Default>(&self, column: &mut [T]) {
+    pub fn memory<T: Clone + Default + Send + 'static>(&self, column: &mut [T]) {
         match *self {
             Self::Retune { .. } => {}
             Self::Forget { lane, .. } => {
@@ -61,7 +93,8 @@ impl LaneChange<'_> {
                     *own = T::default();
                 }
             }
-            Self::Copy { from, to } => copy(column, from, to),
+            Self::Save { lane, image } => image.save(column, lane),
+            Self::Load { lane, image } => image.load(column, lane),
         }
     }
 
@@ -74,16 +107,9 @@ impl LaneChange<'_> {
                     *own = Counter::new(seed, draws.key);
                 }
             }
-            Self::Copy { from, to } => copy(&mut draws.lanes, from, to),
+            Self::Save { lane, image } => image.save(&draws.lanes, lane),
+            Self::Load { lane, image } => image.load(&mut draws.lanes, lane),
         }
-    }
-}
-
-fn copy<T: Clone>(column: &mut [T], from: usize, to: usize) {
-    if let Some(other) = column.get(from).cloned()
-        && let Some(own) = column.get_mut(to)
-    {
-        *own = other;
     }
 }
 
@@ -181,9 +207,11 @@ mod tests {
         forget.parameter(0, &mut parameters);
         forget.memory(&mut memory);
         assert_eq!((&parameters[..], &memory[..]), (&[1.0, 5.0, 3.0][..], &[None, None, Some(9)][..]));
-        let copy = LaneChange::Copy { from: 2, to: 0 };
-        copy.parameter(0, &mut parameters);
-        copy.memory(&mut memory);
+        let image = LaneImage::default();
+        for copy in [LaneChange::Save { lane: 2, image: &image }, LaneChange::Load { lane: 0, image: &image }] {
+            copy.parameter(0, &mut parameters);
+            copy.memory(&mut memory);
+        }
         assert_eq!((&parameters[..], &memory[..]), (&[3.0, 5.0, 3.0][..], &[Some(9), None, Some(9)][..]));
     }
 
@@ -192,7 +220,9 @@ mod tests {
         let mut draws = LaneDraws::new("noise", 3);
         LaneChange::Forget { lane: 1, seed: Seed(5) }.draws(&mut draws);
         let first = draws.lane(1).bits();
-        LaneChange::Copy { from: 1, to: 2 }.draws(&mut draws);
+        let image = LaneImage::default();
+        LaneChange::Save { lane: 1, image: &image }.draws(&mut draws);
+        LaneChange::Load { lane: 2, image: &image }.draws(&mut draws);
         assert_eq!(draws.lane(1).bits(), draws.lane(2).bits());
         LaneChange::Forget { lane: 2, seed: Seed(5) }.draws(&mut draws);
         assert_eq!(draws.lane(2).bits(), first);

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::ops::Range;
 
-use super::{Assembly, Dynamics, LaneChange, Law, Plant, Run, Seed, Simulator, Site, Thetas, Ticks};
+use super::Dynamics;
+use super::{Assembly, LaneChange, LaneImage, Law, Plant, Run, Seed, Simulator, Site, Thetas, Ticks};
 
 /// The running part of a plant of which one lane can be changed while the others go on.
 ///
@@ -22,6 +23,9 @@ pub struct LaneRun<P: Plant> {
     plant: Range<usize>,
     /// Those of each law, in the order in which the laws of a site act.
     of_laws: [Vec<Range<usize>>; 3],
+    /// Each mechanism's id, the number of its site, and of its law there.
+    places: Vec<(&'static str, usize, usize)>,
+    forms: Vec<usize>,
 }
 
 impl<P: Plant> Clone for LaneRun<P>
@@ -29,7 +33,9 @@ where
     P::Dynamics: Clone,
 {
     fn clone(&self) -> Self {
-        Self { run: self.run.clone(), plant: self.plant.clone(), of_laws: self.of_laws.clone() }
+        let Self { run, plant, of_laws, places, forms } = self;
+        let (run, plant, of_laws) = (run.clone(), plant.clone(), of_laws.clone());
+        Self { run, plant, of_laws, places: places.clone(), forms: forms.clone() }
     }
 }
 
@@ -81,26 +87,26 @@ where
         let thetas = Thetas::from_lanes(&vec![nominal; lanes]);
         let run = assembly.run(&thetas, &Thetas::from_lanes(&vec![initial; lanes]), Seed(0));
         let mut of_laws = [Vec::new(), Vec::new(), Vec::new()];
-        let mut at = plant;
+        let (mut places, mut forms, mut at) = (Vec::new(), Vec::new(), plant);
         for (mechanism, form, parameters) in assembly.mechanisms() {
             let site = match mechanism.site(form) {
                 Site::Command => 0,
                 Site::Plant => 1,
                 Site::Observation => 2,
             };
+            places.push((mechanism.about().name, site, of_laws[site].len()));
+            forms.push(form);
             of_laws[site].push(at..at + parameters.len());
             at += parameters.len();
         }
-        Ok(Self { run, plant: 0..plant, of_laws })
+        Ok(Self { run, plant: 0..plant, of_laws, places, forms })
     }
 
     /// Begins lane `lane` anew in `state`, with `values` of all of the assembly's parameters; what is random in it depends on `seed`.
     pub fn begin(&mut self, lane: usize, values: &[f64], state: P::State, seed: Seed) {
         self.retune(lane, values);
         self.change(&LaneChange::Forget { lane, seed });
-        if let Some(own) = self.run.states.get_mut(lane) {
-            *own = state;
-        }
+        self.hold(lane, state);
     }
 
     /// Gives lane `lane` these values of all of the assembly's parameters from now on; what it remembers stays.
@@ -110,12 +116,45 @@ where
 
     /// Lets lane `to` go on as lane `from` is.
     pub fn copy(&mut self, from: usize, to: usize) {
-        self.change(&LaneChange::Copy { from, to });
+        let image = LaneImage::default();
+        self.change(&LaneChange::Save { lane: from, image: &image });
+        self.change(&LaneChange::Load { lane: to, image: &image });
         if let Some(other) = self.run.states.get(from).cloned()
             && let Some(own) = self.run.states.get_mut(to)
         {
             *own = other;
         }
+    }
+
+    /// Lets lane `to` go on as lane `from` of `other` is, which has the same mechanisms. It takes a copy of all of `other`: between
+    /// lanes of one run, [`copy`](Self::copy) does not.
+    pub fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
+        let (image, mut source) = (LaneImage::default(), other.clone());
+        source.change(&LaneChange::Save { lane: from, image: &image });
+        self.change(&LaneChange::Load { lane: to, image: &image });
+        if let Some(state) = other.run.states.get(from) {
+            self.hold(to, state.clone());
+        }
+    }
+
+    /// Puts lane `lane` into `state`; what laws remember stays.
+    pub fn hold(&mut self, lane: usize, state: P::State) {
+        if let Some(own) = self.run.states.get_mut(lane) {
+            *own = state;
+        }
+    }
+
+    /// What the law of the mechanism `id` tells of itself in lane `lane`, as [`Law::told`].
+    #[must_use]
+    pub fn told(&self, id: &str, lane: usize) -> Option<f64> {
+        let (site, law) = self.places.iter().find(|(own, ..)| *own == id).map(|(_, site, law)| (*site, *law))?;
+        let laws = [&self.run.command_laws, &self.run.plant_laws, &self.run.observation_laws];
+        laws[site].get(law)?.told(lane)
+    }
+
+    /// The mechanisms and forms, in the order of the assembly: lanes can be copied between runs that have the same.
+    pub fn kind(&self) -> impl Iterator<Item = (&'static str, usize)> {
+        self.places.iter().map(|(id, ..)| *id).zip(self.forms.iter().copied())
     }
 
     fn change(&mut self, change: &LaneChange<'_>) {

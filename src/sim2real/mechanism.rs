@@ -216,6 +216,10 @@ pub trait Law<P: Plant>: DynClone + Send {
     /// Changes one lane: shows `change` all that is kept by lanes. Laws of plants that no environment steps, as those of a market,
     /// need none.
     fn change(&mut self, _change: &LaneChange<'_>) {}
+    /// A quantity of its own that a sensor may show, in lane `lane`, such as the heat of a winding; none where it has none.
+    fn told(&self, _lane: usize) -> Option<f64> {
+        None
+    }
 }
 
 dyn_clone::clone_trait_object!(<P: Plant> Law<P>);

@@ -30,7 +30,7 @@ pub use assembly::{Assembly, Registry};
 pub use check::{Violation, check_mechanism, check_plant};
 pub use check_lanes::check_lanes;
 pub use controller::{Controller, DerivativeOf, Feedback, Pid};
-pub use lane::{Counter, LaneChange, LaneDraws};
+pub use lane::{Counter, LaneChange, LaneDraws, LaneImage};
 pub use lane_run::{LaneDynamics, LaneRun, LoopIsClosed};
 pub use mechanism::{About, Form, Law, Mechanism, Scene, Signs, Site};
 pub use parameter::{Parameter, Thetas};

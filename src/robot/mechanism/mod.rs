@@ -34,7 +34,7 @@ pub use quadratic_drag::QuadraticDrag;
 pub use stiffness::Stiffness;
 pub use stribeck_friction::StribeckFriction;
 
-use super::{CartPole, Equations, Joint, Tanks};
+use super::{CartPole, Equations, Joint, Pendulum, Tanks};
 use crate::sim2real::Registry;
 use crate::sim2real::mechanism::{
     ActuatorLag, Bias, CommandDelay, DeadZone, Drift, Dropout, Eccentricity, GainError, Noise, ObservationDelay,
@@ -96,6 +96,9 @@ pub static MECHANISMS: Registry<Joint> = rows!(motion, delays OF_SERVOS, rates &
 
 /// The registry of a cart with a pole: mechanisms of motion act on the cart.
 pub static CART_POLE_MECHANISMS: Registry<CartPole> = rows!(motion, delays OF_SERVOS, rates &[(0, 1), (2, 3)]);
+
+/// The registry of a pendulum.
+pub static PENDULUM_MECHANISMS: Registry<Pendulum> = rows!(motion, delays OF_SERVOS, rates &[(0, 1)]);
 
 /// The registry of two tanks: levels are not below 0, and no encoder turns with them.
 pub static TANKS_MECHANISMS: Registry<Tanks> = rows!(signals, delays OF_PROCESSES, rates &[], plant [&Overflow], sensor []);

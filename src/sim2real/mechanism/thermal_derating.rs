@@ -108,6 +108,11 @@ where
         self.0.change(change);
     }
 
+    /// The part of the gain that the heat takes.
+    fn told(&self, lane: usize) -> Option<f64> {
+        self.0.lost.get(lane).copied()
+    }
+
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
         self.0.pass(tick, commands, |heat| (1.0 - heat).max(0.0));
     }
@@ -122,6 +127,11 @@ where
 {
     fn change(&mut self, change: &LaneChange<'_>) {
         self.0.change(change);
+    }
+
+    /// The part of the gain that the heat takes.
+    fn told(&self, lane: usize) -> Option<f64> {
+        self.0.lost.get(lane).copied()
     }
 
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
