@@ -1,6 +1,7 @@
 //! Robots: plants that move, and what their simulators tend to leave out.
 
 mod cart_pole;
+pub mod env;
 mod equations;
 mod estimate;
 mod joint;
@@ -16,6 +17,7 @@ mod tanks;
 mod twin;
 
 pub use cart_pole::{CartPole, CartPoleDynamics, CartPoleView, Integration};
+pub use env::ENVIRONMENTS;
 pub use equations::{
     Attachment, Driving, EquationError, EquationSystem, Equations, EquationsDynamics, InputVariable, Measurements,
     OutputVariable, Outputs, StateVariable,
@@ -27,6 +29,8 @@ pub use pendulum::{Pendulum, PendulumDynamics};
 pub use preset::presets as robot_presets;
 pub use signal::{Commands, Signal};
 pub use tanks::{Level, Levels, Rims, Tanks, TanksDynamics};
+#[cfg(feature = "io")]
+use twin::assembly as twin_assembly;
 #[cfg(feature = "io")]
 pub use twin::{
     cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,

@@ -220,7 +220,7 @@ mod tests {
 
     fn swing(rows: usize, spacing: f64) -> Recording<Commands> {
         let time: Vec<f64> = (0..rows).map(|i| i as f64 * spacing).collect();
-        let samples = time.iter().map(|t| Some(3.0 + 0.4 * (3.0 * t).sin())).collect();
+        let samples = time.iter().map(|t| Some(0.4 * (3.0 * t).sin() - 0.3)).collect();
         let measured = vec![Measured { channel: "angle".into(), unit: "rad".into(), samples }];
         let commands = time.iter().map(|t| 2.0 * (2.0 * t).sin() + (5.0 * t).cos()).collect();
         Recording { name: "swing".into(), stimulus: Commands(commands), measured, time }

@@ -129,9 +129,18 @@ where
     /// Lets lane `to` go on as lane `from` of `other` is, which has the same mechanisms. It takes a copy of all of `other`: between
     /// lanes of one run, [`copy`](Self::copy) does not.
     pub fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
-        let (image, mut source) = (LaneImage::default(), other.clone());
-        source.change(&LaneChange::Save { lane: from, image: &image });
+        self.adopt(&mut other.clone(), from, to);
+    }
+
+    /// The same, where `other` need not be copied. What was last observed goes with it: a lane that begins while others are under way
+    /// begins in a run of its own, and is observed there.
+    pub fn adopt(&mut self, other: &mut Self, from: usize, to: usize) {
+        let image = LaneImage::default();
+        other.change(&LaneChange::Save { lane: from, image: &image });
         self.change(&LaneChange::Load { lane: to, image: &image });
+        if let (Some(seen), Some(own)) = (other.run.observations.get(from), self.run.observations.get_mut(to)) {
+            own.clone_from(seen);
+        }
         if let Some(state) = other.run.states.get(from) {
             self.hold(to, state.clone());
         }
