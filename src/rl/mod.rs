@@ -3,6 +3,9 @@
 //! It knows no joint and no order: environments are in `robot::env` and `market::env`.
 
 mod about;
+mod autoreset;
+mod check;
+mod checked;
 mod env;
 mod episodes;
 mod error;
@@ -12,14 +15,21 @@ mod space;
 mod stream;
 mod threads;
 mod vector;
+#[cfg(test)]
+mod walk;
+pub mod wrapper;
 
 pub use about::{About, InfoChannel};
+pub use autoreset::{Autoreset, AutoresetMode, Finals};
+pub use check::{EnvReport, Finding, Rule, check_env};
+pub use checked::Checked;
 pub use env::{Each, Env, Step};
 pub use episodes::Episodes;
 pub use error::EnvError;
 pub use options::{Occasion, OptionAbout, OptionKind, OptionValue, Options};
-pub use registry::{EnvEntry, EnvRegistry};
+pub use registry::{EnvEntry, EnvRegistry, Made};
 pub use space::{Actions, BoxSpace, Space};
 pub use stream::{Episode, Stream, StreamName};
 pub use threads::Threads;
 pub use vector::{Buffers, Out, VecEnv, Which, alike};
+pub use wrapper::{TimeLimit, Wrap, Wrapped};
