@@ -4,6 +4,7 @@
 
 mod about;
 mod autoreset;
+mod check;
 mod checked;
 mod env;
 mod episodes;
@@ -20,6 +21,7 @@ pub mod wrapper;
 
 pub use about::{About, InfoChannel};
 pub use autoreset::{Autoreset, AutoresetMode, Finals};
+pub use check::{EnvReport, Finding, Rule, check_env};
 pub use checked::Checked;
 pub use env::{Each, Env, Step};
 pub use episodes::Episodes;

@@ -2,11 +2,12 @@
 
 use super::estimate::{local, motion, rounding, typical};
 use super::joint::{Axis, CREEP_RATE, CREEP_SHARE};
-use super::mover::{Motion, Mover, Push};
+use super::mover::{Motion, Mover, Push, rubbed};
 use super::runge_kutta::{Contact, step_with_friction};
 use super::signal::{Commands, Signal};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
+    Typical,
 };
 
 /// A cart of mass `M` at `x`, driven by `gain u`, with a uniform pole of mass `m` and half length `l` hinged on it, at the
@@ -28,6 +29,21 @@ use crate::sim2real::{
 #[derive(Debug, Clone, PartialEq)]
 pub struct CartPole {
     parameters: Vec<Parameter>,
+    integration: Integration,
+}
+
+/// How a cart-pole is integrated.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Integration {
+    /// By classical Runge-Kutta, at 1 ms and finer.
+    #[default]
+    RungeKutta,
+    /// By Euler's explicit method, in steps of `step` [s]: as Gymnasium has it, whose step of 0.02 s is a part of the task. Dry
+    /// friction stops the cart within a step, as the joint's does.
+    Euler {
+        /// Length of a step [s].
+        step: f64,
+    },
 }
 
 /// The parameters of a cart-pole in their order: name and unit.
@@ -86,7 +102,14 @@ impl CartPole {
                 }
             })
             .collect();
-        Self { parameters }
+        Self { parameters, integration: Integration::default() }
+    }
+
+    /// The same, integrated in another way.
+    #[must_use]
+    pub fn integrated(mut self, integration: Integration) -> Self {
+        self.integration = integration;
+        self
     }
 
     /// The names and units of its parameters, in the order of [`CartPole::new`].
@@ -110,7 +133,10 @@ impl Plant for CartPole {
     }
 
     fn clock(&self) -> Clock {
-        Clock::Sampled { longest_step: LONGEST_STEP }
+        match self.integration {
+            Integration::RungeKutta => Clock::Sampled { longest_step: LONGEST_STEP },
+            Integration::Euler { step } => Clock::Sampled { longest_step: step },
+        }
     }
 
     fn channels(&self) -> &[Channel] {
@@ -161,7 +187,8 @@ impl Plant for CartPole {
 
     fn dynamics(&self, thetas: &Thetas) -> CartPoleDynamics {
         let values = |lane: usize| std::array::from_fn(|k| thetas.row(k)[lane]);
-        CartPoleDynamics { lanes: (0..thetas.lanes()).map(|lane| Lane::of(values(lane))).collect() }
+        let lanes = (0..thetas.lanes()).map(|lane| Lane::of(values(lane))).collect();
+        CartPoleDynamics { lanes, integration: self.integration }
     }
 }
 
@@ -169,6 +196,7 @@ impl Plant for CartPole {
 #[derive(Debug, Clone)]
 pub struct CartPoleDynamics {
     lanes: Vec<Lane>,
+    integration: Integration,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -231,6 +259,22 @@ impl Lane {
     }
 }
 
+impl Lane {
+    /// One step of Euler's explicit method. Where dry friction stops the cart within the step, its acceleration is the mean one.
+    fn euler(&self, state: &[f64; 4], step: f64, command: f64, push: &Push) -> [f64; 4] {
+        let [position, velocity, angle, spin] = *state;
+        let (sin, cos) = angle.sin_cos();
+        let rate = self.rate(state, command, push, Contact::Sliding(0.0));
+        let mut acceleration = rate[1];
+        if push.dry_friction > 0.0 {
+            let held = step * push.dry_friction / self.inertia(self.cart_mass + push.inertia, cos);
+            acceleration = (rubbed(velocity, velocity + step * acceleration, held) - velocity) / step;
+        }
+        let turning = 0.75 / self.half_length * (self.leaning(sin, spin) / self.pole_mass - cos * acceleration);
+        [position + step * velocity, velocity + step * acceleration, angle + step * spin, spin + step * turning]
+    }
+}
+
 impl Mover for CartPole {
     fn motion(state: &[f64; 4]) -> Motion {
         Motion { position: state[0], velocity: state[1] }
@@ -254,6 +298,12 @@ impl Mover for CartPole {
     }
 }
 
+impl LaneDynamics<CartPole> for CartPoleDynamics {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.lanes, |values| Lane::of(std::array::from_fn(|k| values[k])));
+    }
+}
+
 impl Dynamics<CartPole> for CartPoleDynamics {
     fn initial(&self, initial: &Thetas) -> Vec<[f64; 4]> {
         (0..initial.lanes()).map(|lane| std::array::from_fn(|k| initial.row(k)[lane])).collect()
@@ -261,9 +311,14 @@ impl Dynamics<CartPole> for CartPoleDynamics {
 
     fn advance(&self, tick: Tick, states: &mut [[f64; 4]], _: &[()], commands: &[Signal], effects: &[Push]) {
         for (((state, command), push), lane) in states.iter_mut().zip(commands).zip(effects).zip(&self.lanes) {
-            let net = |s: &[f64; 4]| lane.force(s, command.0, push) + lane.reaction(s);
-            let rate = |s: &[f64; 4], contact: Contact| lane.rate(s, command.0, push, contact);
-            *state = step_with_friction(*state, tick.step, 1, push.dry_friction, net, rate);
+            *state = match self.integration {
+                Integration::RungeKutta => {
+                    let net = |s: &[f64; 4]| lane.force(s, command.0, push) + lane.reaction(s);
+                    let rate = |s: &[f64; 4], contact: Contact| lane.rate(s, command.0, push, contact);
+                    step_with_friction(*state, tick.step, 1, push.dry_friction, net, rate)
+                }
+                Integration::Euler { .. } => lane.euler(state, tick.step, command.0, push),
+            };
         }
     }
 
@@ -278,7 +333,7 @@ impl Dynamics<CartPole> for CartPoleDynamics {
 mod tests {
     use super::*;
     use crate::robot::CART_POLE_MECHANISMS;
-    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_mechanism, check_plant};
+    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_lanes, check_mechanism, check_plant};
 
     const VALUES: [f64; 7] = [1.0, 0.1, 0.5, 9.8, 0.3, 0.01, 2.0];
 
@@ -303,7 +358,22 @@ mod tests {
         check_plant(&plant(), CART_POLE_MECHANISMS, &hanging(400)).unwrap();
         for mechanism in CART_POLE_MECHANISMS {
             check_mechanism(*mechanism, &plant(), CART_POLE_MECHANISMS, &hanging(800)).unwrap();
+            check_lanes(*mechanism, &plant(), CART_POLE_MECHANISMS, &hanging(800)).unwrap();
         }
+    }
+
+    #[test]
+    fn by_euler_it_keeps_the_contract_too_and_dry_friction_holds_it() {
+        let euler = || plant().integrated(Integration::Euler { step: 0.02 });
+        check_plant(&euler(), CART_POLE_MECHANISMS, &hanging(400)).unwrap();
+        for mechanism in CART_POLE_MECHANISMS {
+            check_lanes(*mechanism, &euler(), CART_POLE_MECHANISMS, &hanging(400)).unwrap();
+        }
+        let hangs = [0.0, 0.0, std::f64::consts::PI, 0.0];
+        let lane = Lane::of(VALUES);
+        let stuck = lane.euler(&hangs, 0.02, 0.4, &Push { dry_friction: 1.0, ..Push::default() });
+        assert_eq!(stuck[..2], [0.0, 0.0]);
+        assert!(lane.euler(&hangs, 0.02, 0.6, &Push { dry_friction: 1.0, ..Push::default() })[1] > 0.0);
     }
 
     /// The accelerations of Gymnasium's `CartPoleEnv.step`, line by line; without friction, as there.

@@ -234,6 +234,10 @@ impl<E: VecEnv + Clone> VecEnv for ActionLatency<E> {
 
     fn copy_lane_from(&mut self, other: &dyn VecEnv, from: usize, to: usize) -> Result<(), EnvError> {
         let other = alike(self, other)?;
+        if self.steps != other.steps || self.parts != other.parts {
+            let why = "a latency of actions is set otherwise".into();
+            return Err(EnvError::Unlike { id: self.about.id.clone(), why });
+        }
         self.env.copy_lane_from(&other.env, from, to)?;
         self.copy(Some(other), from, to);
         Ok(())
@@ -308,6 +312,8 @@ mod tests {
             })
             .collect();
         assert_eq!(counts, [-1.0, 0.0, 1.0]);
+        let other = |steps| ActionLatency::new(Push::new(1), Latency::steps(steps)).unwrap();
+        assert!(other(1).copy_lane_from(&other(2), 0, 0).unwrap_err().to_string().contains("set otherwise"));
         assert!(ActionLatency::new(Push::new(1), Latency::seconds(0.1, 0.0)).unwrap_err().to_string().contains("in steps"));
     }
 }

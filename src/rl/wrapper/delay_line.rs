@@ -86,8 +86,10 @@ impl<T: Copy + Default> DelayLine<T> {
                 }
             }
         }
-        let other = other.map(|other| [other.sent[from], other.arrived[from]]);
-        [self.sent[to], self.arrived[to]] = other.unwrap_or([self.sent[from], self.arrived[from]]);
+        [self.sent[to], self.arrived[to]] = match other {
+            Some(other) => [other.sent[from], other.arrived[from]],
+            None => [self.sent[from], self.arrived[from]],
+        };
     }
 }
 

@@ -42,7 +42,12 @@ pub trait Layer: Clone + Send + 'static {
     /// The value of its own info channel number `channel`, one a lane.
     fn info(&self, _channel: usize, _values: &mut [f64]) {}
 
-    /// Makes lane `to` a copy of lane `from`: of `other`, or else of its own lanes.
+    /// Whether a lane of `other` has a place here: not where the two are set so that they keep more or less in memory.
+    fn holds(&self, _other: &Self) -> bool {
+        true
+    }
+
+    /// Makes lane `to` a copy of lane `from`: of `other`, which it [`holds`](Self::holds), or else of its own lanes.
     fn copy_lane(&mut self, other: Option<&Self>, from: usize, to: usize);
 }
 
@@ -222,6 +227,9 @@ impl<E: VecEnv + Clone, L: Layer> VecEnv for Wrapped<E, L> {
 
     fn copy_lane_from(&mut self, other: &dyn VecEnv, from: usize, to: usize) -> Result<(), EnvError> {
         let other = alike(self, other)?;
+        if !self.layer.holds(&other.layer) {
+            return Err(EnvError::Unlike { id: self.about.id.clone(), why: format!("{} is set otherwise", L::NAME) });
+        }
         self.env.copy_lane_from(&other.env, from, to)?;
         self.episodes.copy_lane_from(&other.episodes, from, to);
         self.layer.copy_lane(Some(&other.layer), from, to);

@@ -87,6 +87,10 @@ impl Layer for ObservationLatency {
         }
     }
 
+    fn holds(&self, other: &Self) -> bool {
+        self.latency == other.latency
+    }
+
     fn copy_lane(&mut self, other: Option<&Self>, from: usize, to: usize) {
         match (&mut self.line, other.map(|other| &other.line)) {
             (Line::Fixed(line), Some(Line::Fixed(other))) => line.copy_lane(Some(other), from, to),
@@ -170,6 +174,14 @@ mod tests {
             seen[ages[0]] = true;
         }
         assert_eq!(seen, [true; 4]);
+    }
+
+    #[test]
+    fn a_lane_of_another_latency_has_no_place() {
+        let late = |steps| Walk::new(1).with(ObservationLatency::new(Latency::steps(steps))).unwrap();
+        let error = late(2).copy_lane_from(&late(3), 0, 0).unwrap_err().to_string();
+        assert!(error.contains("a latency of observations is set otherwise"), "{error}");
+        assert!(late(2).copy_lane_from(&late(2), 0, 0).is_ok());
     }
 
     #[test]
