@@ -254,7 +254,7 @@ pub struct DataSeen {
 }
 
 impl DataSeen {
-    pub(super) fn of(line: &Line<'_>) -> Self {
+    pub(super) fn of(line: &Line) -> Self {
         let finer = [RowKind::Trades, RowKind::Depth, RowKind::Orders, RowKind::Quotes];
         Self {
             quoted: line.tells(RowKind::Quotes),
@@ -370,8 +370,8 @@ impl Backtest {
 
     /// Starts it, before its first event.
     #[must_use]
-    pub fn start(&self) -> Session<'_> {
-        Session::new(self, Feed::new(&self.histories))
+    pub fn start(&self) -> Session {
+        Session::new(Arc::new(self.clone()), Feed::new(&self.histories))
     }
 
     /// Starts it on streams, one set an instrument, before its first event: of the data only what lies around the present is in
@@ -379,7 +379,7 @@ impl Backtest {
     ///
     /// # Errors
     /// What the streams refuse of their first rows; not as many sets as instruments; no data at all.
-    pub fn start_on(&self, sources: Vec<Sources>) -> Result<Session<'_>, BacktestError> {
+    pub fn start_on(&self, sources: Vec<Sources>) -> Result<Session, BacktestError> {
         let (instruments, histories) = (self.instruments.len(), sources.len());
         if instruments != histories {
             return Err(BacktestError::Unmatched { instruments, histories });
@@ -388,7 +388,7 @@ impl Backtest {
         if feed.peek().is_none() {
             return Err(BacktestError::NoData);
         }
-        Ok(Session::new(self, feed))
+        Ok(Session::new(Arc::new(self.clone()), feed))
     }
 
     /// Runs it from the first event to the last.

@@ -9,7 +9,7 @@ use super::session::Session;
 use super::venue::Resting;
 use super::{Arrival, Bar, Dividend, Event, EventKind, LedgerError, MoneyError, OrderId, Reason, Split, Strategy};
 
-impl Session<'_> {
+impl Session {
     /// The ex-instant of an action has come. What became of orders of its instrument before is known to their owner now
     /// at the latest, so that it is booked in the units of before.
     pub(super) fn take_action(

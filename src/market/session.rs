@@ -1,6 +1,7 @@
 //! A backtest under way: feed, strategy, venue and ledger, one event at a time.
 
 use std::fmt;
+use std::sync::Arc;
 
 use crate::sim2real::Timestamp;
 
@@ -29,9 +30,9 @@ mod quiet;
 mod telling;
 
 /// A backtest under way.
-pub struct Session<'d> {
-    pub(super) setup: &'d Backtest,
-    pub(super) feed: Feed<'d>,
+pub struct Session {
+    pub(super) setup: Arc<Backtest>,
+    pub(super) feed: Feed,
     transit: Transit,
     /// Trades value what is held: there is nothing else that could.
     trades_mark: Vec<bool>,
@@ -41,7 +42,7 @@ pub struct Session<'d> {
     can_be_quiet: bool,
     pub(super) agenda: Agenda,
     pub(super) clocks: Clocks,
-    pub(super) timetable: Timetable<'d>,
+    pub(super) timetable: Timetable,
     pub(super) known: Vec<Known>,
     pub(super) daily: Vec<Daily>,
     pub(super) venue: Venue,
@@ -66,14 +67,14 @@ pub struct Session<'d> {
     pub(super) keeping: Option<Box<Keeping>>,
 }
 
-impl fmt::Debug for Session<'_> {
+impl fmt::Debug for Session {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Session").field("events", &self.held.events).finish_non_exhaustive()
     }
 }
 
 /// How finely the data of an instrument know its market.
-fn detail(line: &Line<'_>) -> Detail {
+fn detail(line: &Line) -> Detail {
     if line.tells(RowKind::Orders) {
         Detail::ByOrder
     } else if line.tells(RowKind::Depth) {
@@ -85,8 +86,8 @@ fn detail(line: &Line<'_>) -> Detail {
     }
 }
 
-impl<'d> Session<'d> {
-    pub(super) fn new(setup: &'d Backtest, feed: Feed<'d>) -> Self {
+impl Session {
+    pub(super) fn new(setup: Arc<Backtest>, feed: Feed) -> Self {
         let Settings { seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
         let stale = StaleQuotes::delay_before(&setup.venue);
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
@@ -127,7 +128,7 @@ impl<'d> Session<'d> {
         let mut venue = Venue::new(&setup.venue, &venue);
         let conceding = venue.conceding.len();
         let count = setup.instruments.len();
-        let calendars = setup.settings.calendars.iter().map(Option::as_deref);
+        let calendars = setup.settings.calendars.iter().map(Option::as_ref);
         let timetable = Timetable::new(calendars, &setup.settings.halts, count);
         for k in (0..count).filter(|k| timetable.keeps(*k)) {
             let has_hours = timetable.each().get(k).is_some_and(Option::is_some);
@@ -190,7 +191,7 @@ impl<'d> Session<'d> {
     #[must_use]
     pub fn fork(&self) -> Option<Self> {
         Some(Self {
-            setup: self.setup,
+            setup: Arc::clone(&self.setup),
             feed: self.feed.forked()?,
             transit: self.transit.clone(),
             trades_mark: self.trades_mark.clone(),

@@ -64,8 +64,8 @@ pub struct View<'a> {
     pub(super) increments: &'a [Increments],
     pub(super) ledger: &'a Ledger,
     pub(super) equity: Cash,
-    pub(super) hours: &'a [Option<TradingHours<'a>>],
-    pub(super) halts: &'a [Halts<'a>],
+    pub(super) hours: &'a [Option<TradingHours>],
+    pub(super) halts: &'a [Halts],
 }
 
 impl<'a> View<'a> {
