@@ -371,7 +371,23 @@ impl Backtest {
     /// Starts it, before its first event.
     #[must_use]
     pub fn start(&self) -> Session {
-        Session::new(Arc::new(self.clone()), Feed::new(&self.histories))
+        let feed = Feed::new(&self.histories);
+        let room = feed.rows();
+        Session::new(Arc::new(self.clone()), feed, room)
+    }
+
+    /// Starts it in the midst of its data: rows that were known before `from` are left out, which is found by bisection. The books of
+    /// data that tell them change by change are empty then, and fill as changes come.
+    ///
+    /// It is the run of [`on`](Self::on) the rows from there, without a copy of them.
+    #[must_use]
+    pub fn start_from(self: &Arc<Self>, from: Timestamp) -> Session {
+        self.start_with_room(from, None)
+    }
+
+    /// The same, with room for the equity of so many events.
+    pub(super) fn start_with_room(self: &Arc<Self>, from: Timestamp, room: Option<usize>) -> Session {
+        Session::new(Arc::clone(self), Feed::from(&self.histories, from), room)
     }
 
     /// Starts it on streams, one set an instrument, before its first event: of the data only what lies around the present is in
@@ -388,7 +404,8 @@ impl Backtest {
         if feed.peek().is_none() {
             return Err(BacktestError::NoData);
         }
-        Ok(Session::new(Arc::new(self.clone()), feed))
+        let room = feed.rows();
+        Ok(Session::new(Arc::new(self.clone()), feed, room))
     }
 
     /// Runs it from the first event to the last.

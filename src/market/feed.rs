@@ -51,6 +51,19 @@ impl Feed {
         Self::of(histories.iter().map(Line::whole).collect())
     }
 
+    /// The same without the rows that were known before `from`.
+    #[must_use]
+    pub fn from(histories: &[History], from: Timestamp) -> Self {
+        let mut feed = Self::new(histories);
+        for (track, time) in feed.tracks.iter_mut().zip(&mut feed.times) {
+            let line = &feed.lines[track.instrument];
+            track.next = line.first_known(track.kind, from);
+            *time = line.time(track.kind, track.next);
+        }
+        feed.build();
+        feed
+    }
+
     /// A feed of streams, of each instrument those at its place. It is for who reads on when it [is low](Self::is_low).
     ///
     /// # Errors

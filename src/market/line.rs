@@ -225,6 +225,20 @@ impl Line {
         known_at.map_or(time, |known_at| known_at.max(time))
     }
 
+    /// The first row at hand that was known at `from` or later.
+    pub fn first_known(&self, kind: RowKind, from: Timestamp) -> usize {
+        let before = |time: &Timestamp| *time < from;
+        let place = match kind {
+            RowKind::Bars => self.bars().partition_point(|bar| bar.known_at < from),
+            RowKind::Quotes => self.all_quotes().times().partition_point(before),
+            RowKind::Trades if self.prints_known().is_empty() => self.prints().partition_point(|print| print.time < from),
+            RowKind::Trades => self.prints_known().partition_point(before),
+            RowKind::Depth => self.changes().partition_point(|change| change.known_at < from),
+            RowKind::Orders => self.events().partition_point(|event| event.known_at < from),
+        };
+        self.first[kind as usize] + place
+    }
+
     /// One row behind the last of those that belong to the same instant as `row`: a book is told in many changes, and is
     /// whole when all of one instant are in.
     #[inline(always)]

@@ -26,6 +26,7 @@ use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger,
 
 mod clocked;
 mod exchange;
+mod outside;
 mod quiet;
 mod telling;
 
@@ -87,7 +88,8 @@ fn detail(line: &Line) -> Detail {
 }
 
 impl Session {
-    pub(super) fn new(setup: Arc<Backtest>, feed: Feed) -> Self {
+    /// A session before its first event, with room for the equity of so many of them.
+    pub(super) fn new(setup: Arc<Backtest>, feed: Feed, room: Option<usize>) -> Self {
         let Settings { seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
         let stale = StaleQuotes::delay_before(&setup.venue);
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
@@ -139,7 +141,7 @@ impl Session {
         let (ledger, keeping) = Keeping::start(&setup.settings, count, origin, &mut agenda);
         let mut session = Self {
             setup,
-            equity: EquityCurve::new(equity_every, feed.rows()),
+            equity: EquityCurve::new(equity_every, room),
             feed,
             trades_mark,
             transit: Transit::new(count),
