@@ -12,7 +12,7 @@ use super::paper_log::{PaperLog, Replayed};
 
 /// A paper run under way: the session of a backtest that goes as far as it is told, with all it does in the journal.
 pub struct PaperSession<'p> {
-    session: Session<'p>,
+    session: Session,
     strategy: Limited,
     run: &'p RunFile,
     log: Arc<Mutex<PaperLog>>,
@@ -49,7 +49,7 @@ impl std::fmt::Debug for PaperSession<'_> {
 
 impl<'p> PaperSession<'p> {
     pub(super) fn new(
-        session: Session<'p>,
+        session: Session,
         strategy: Box<dyn Strategy>,
         settings: PaperSettings,
         run: &'p RunFile,
