@@ -6,7 +6,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArray1, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
-use trueup::io::hint_among;
+use trueup::io::{RunFile, hint_among};
+use trueup::market::env::{MarketSetup, make_on};
 use trueup::rl::{
     About, Actions, AutoresetMode, BoxSpace, Checked, EnvEntry, EnvError, InfoChannel, Occasion, OptionKind, OptionValue, Options,
     Out, Space, Threads, VecEnv, Which,
@@ -20,7 +21,7 @@ const MANY: usize = 64;
 
 /// The environments that can be made by their ids.
 fn entries() -> impl Iterator<Item = &'static EnvEntry> {
-    std::iter::empty()
+    trueup::robot::ENVIRONMENTS.iter().chain(trueup::market::ENVIRONMENTS)
 }
 
 /// Ids of the environments, each with what has to be done in it.
@@ -67,7 +68,8 @@ fn drive(py: Python<'_>, driver: &mut Driver, job: impl FnOnce(&mut Driver) -> R
 #[pymethods]
 impl Lanes {
     /// `lanes` lanes of the environment `id`, split over `threads` chunks that are stepped side by side; `mode` is "NextStep",
-    /// "SameStep" or "Disabled".
+    /// "SameStep" or "Disabled". Beside the environment's own options, one of a market has `run`: the path of the RUN.toml whose data and
+    /// venue it is in.
     #[new]
     fn new(py: Python<'_>, id: &str, lanes: usize, mode: &str, threads: usize, options: &Bound<'_, PyDict>) -> PyResult<Self> {
         let entry = entries().find(|entry| entry.id == id).ok_or_else(|| {
@@ -82,10 +84,15 @@ impl Lanes {
                 return Err(error::refused(py, &format!("there is no autoreset mode {other:?}"), "NextStep, SameStep or Disabled"));
             }
         };
-        let options = options_of(py, options)?;
+        let mut options = options_of(py, options)?;
+        let market = market_of(py, id, &mut options)?;
+        let make = |lanes: usize| match &market {
+            Some(setup) => make_on(id, lanes, setup.clone(), &options),
+            None => (entry.make)(lanes, &options),
+        };
         let made = py.detach(|| match threads {
-            0 | 1 => (entry.make)(lanes, &options),
-            threads => Threads::new(lanes, threads, |lanes| (entry.make)(lanes, &options)).map(|env| Box::new(env) as Box<dyn VecEnv>),
+            0 | 1 => make(lanes),
+            threads => Threads::new(lanes, threads, make).map(|env| Box::new(env) as Box<dyn VecEnv>),
         });
         let driver = made.and_then(|env| Checked::new(env, mode)).map_err(|error| refused(py, &error))?;
         let size = driver.about().observation.size();
@@ -212,6 +219,19 @@ impl Lanes {
     fn closed(&self) -> bool {
         self.looked_at().closed()
     }
+}
+
+/// The market of the RUN.toml that the option `run` names, of an environment of a market.
+fn market_of(py: Python<'_>, id: &str, options: &mut Options) -> PyResult<Option<MarketSetup>> {
+    if trueup::market::ENVIRONMENTS.iter().all(|entry| entry.id != id) {
+        return Ok(None);
+    }
+    let Some(run) = options.take("run") else { return Ok(None) };
+    let OptionValue::Text(path) = run else {
+        return Err(error::refused(py, &format!("the option `run` is {run}"), "the path of a RUN.toml"));
+    };
+    let read = py.detach(|| RunFile::read(path).and_then(|file| MarketSetup::from_run(&file)));
+    read.map(Some).map_err(|error| error::input(py, &error))
 }
 
 fn scattered(py: Python<'_>, what: &str) -> PyErr {

@@ -45,3 +45,33 @@ def test_a_pole_is_balanced():
     scores = returns_of(test, np.tile(learnt, (100, 1)), push, 500, seed=10_000)
     # Gymnasium counts CartPole-v1 as solved from a mean of 475 over 100 episodes on.
     assert scores.mean() > 475, scores.mean()
+
+
+def shares(weights, observations):
+    """A share of the portfolio in [-1, 1] by a linear policy of what is observed, with an intercept."""
+    told = np.einsum("lk,lk->l", weights[:, :-1], observations) + weights[:, -1]
+    return np.tanh(told).astype(np.float32)[:, None]
+
+
+def test_a_planted_signal_is_found_and_beats_holding():
+    """Returns follow those before them: who reads them gains, and who buys and holds does not."""
+    rng = np.random.default_rng(1)
+    market = {"rows": 4_000, "momentum": 0.3, "length": 100, "commission": 0.1}
+    env = envs.make_vec("trueup/Trade-v0", 64, info=False, data_seed=1, **market)
+    size = env.single_observation_space.shape[0]
+    names = env.about["observation"]["names"]
+
+    def returns(weights):
+        # The mean of some episodes, for one alone is mostly luck.
+        return np.mean([returns_of(env, weights, shares, 100, seed=1_000 * k) for k in range(3)], axis=0)
+
+    learnt = cross_entropy(returns, size + 1, rng, rounds=10, spread=0.3)
+    # Other data: the same law, other draws.
+    test = envs.make_vec("trueup/Trade-v0", 64, info=False, data_seed=2, **market)
+    gained = returns_of(test, np.tile(learnt, (64, 1)), shares, 100, seed=5)
+    hold = np.zeros((64, size + 1))
+    hold[:, -1] = 100.0
+    held = returns_of(test, hold, shares, 100, seed=5)
+    better = gained - held
+    assert better.mean() > 3 * better.std() / np.sqrt(64), (better.mean(), better.std())
+    assert gained.mean() > 0 and learnt[names.index("return_1")] > 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -34,7 +35,8 @@ class Environment(gymnasium.Env):
     identity : str
         Its id, such as ``"trueup/CartPole-v0"``.
     **options
-        What can be set when it is made; ``about["options"]`` lists it with units and bounds.
+        What can be set when it is made; ``about["options"]`` lists it with units and bounds. An environment of a market also has `run`: the
+        path of a RUN.toml, whose data, venue and account it is then in, instead of data that are generated.
 
     Observations are float32 arrays of the space's shape, rewards floats, info a dict of floats by channel (``about["info"]`` has their
     units); the observation's components have names and units in ``about["observation"]``.
@@ -50,6 +52,8 @@ class Environment(gymnasium.Env):
             hint = "leave render_mode out"
             raise seeds.InputError(f"{identity} has nothing to render\n  hint: {hint}", hint=hint)
         self.render_mode = None
+        if isinstance(options.get("run"), os.PathLike):
+            options["run"] = os.fspath(options["run"])
         self._identity, self._options = identity, dict(options)
         self._lanes = _trueup.Lanes(identity, 1, "Disabled", 1, self._options)
         #: What the environment is: title, spaces with names and units, info channels, options.

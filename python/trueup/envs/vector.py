@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -65,6 +66,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv):
         for name, count in (("num_envs", num_envs), ("threads", threads)):
             if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
                 raise _wrong(f"{name} is {count!r}", "a whole number of at least 1")
+        if isinstance(options.get("run"), os.PathLike):
+            options["run"] = os.fspath(options["run"])
         self._identity, self._options = identity, dict(options)
         self._settings = {"num_envs": int(num_envs), "autoreset_mode": mode, "threads": int(threads), "info": bool(info)}
         self._lanes = _trueup.Lanes(identity, int(num_envs), mode.value, int(threads), self._options)
