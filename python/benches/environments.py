@@ -15,6 +15,7 @@ import time
 
 import gymnasium
 import numpy as np
+
 import trueup
 from trueup import envs
 

@@ -1,11 +1,12 @@
 """A simulator written in Python, and what it leaves out: a heater that also radiates.
 
-    python python/examples/diagnose_a_simulator.py
+python python/examples/diagnose_a_simulator.py
 """
 
 from __future__ import annotations
 
 import numpy as np
+
 import trueup
 
 

@@ -1,6 +1,6 @@
 """The crossover that trueup has compiled in, as a strategy of Python, and the audit that shows it does not see the future.
 
-    python python/examples/sma_cross.py [RUN.toml]
+python python/examples/sma_cross.py [RUN.toml]
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 import trueup
 
 
@@ -147,7 +148,9 @@ def simulator(follow=heaters, vectorized=True, **changes):
 def recording(rng, radiation, rows=800):
     time = np.arange(rows) * 0.5
     switch = rng.integers(20, 60, size=200).cumsum()
-    u = (np.searchsorted(switch, np.arange(rows)) % 2).astype(float) * rng.uniform(0.4, 1.0, size=200)[np.searchsorted(switch, np.arange(rows))]
+    u = (np.searchsorted(switch, np.arange(rows)) % 2).astype(float) * rng.uniform(0.4, 1.0, size=200)[
+        np.searchsorted(switch, np.arange(rows))
+    ]
     truth = {"capacity": 46.0, "loss": 0.9, "power": 20.0, "temperature": 0.0, "quadratic_drag.coefficient": radiation}
     clean = heater(truth, time, {"u": u})["temperature"]
     return trueup.Recording({"t": time, "u": u, "temperature": clean + 0.02 * rng.normal(size=rows)}, name="run")

@@ -11,8 +11,9 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium")
 
-import trueup
 from gymnasium.utils.env_checker import check_env
+
+import trueup
 from trueup import envs
 
 IDS = sorted(envs.ids())
@@ -173,7 +174,23 @@ def test_what_comes_out_of_order_is_said():
 
 @pytest.mark.parametrize(
     "action",
-    [2, -1, 10**30, 0.0, np.float32(0), float("nan"), None, "left", [0], [[0, 1], [0]], np.array([0]), np.zeros((2, 2)), True, object(), {}],
+    [
+        2,
+        -1,
+        10**30,
+        0.0,
+        np.float32(0),
+        float("nan"),
+        None,
+        "left",
+        [0],
+        [[0, 1], [0]],
+        np.array([0]),
+        np.zeros((2, 2)),
+        True,
+        object(),
+        {},
+    ],
 )
 def test_an_action_that_is_none_is_refused_and_nothing_moves(action):
     env, twin = envs.make(CART_POLE), envs.make(CART_POLE)
@@ -193,7 +210,17 @@ def test_a_real_action_that_is_none_is_refused_and_nothing_moves(identity):
     env.reset(seed=1), twin.reset(seed=1)
     shape, high = env.action_space.shape, env.action_space.high
     good = np.zeros(shape, np.float32)
-    wrong = [np.full(shape, np.nan), np.full(shape, np.inf), high + 1.0, np.zeros((*shape, 1)), np.zeros(0), "x", None, good.astype(complex), good.astype(bool)]
+    wrong = [
+        np.full(shape, np.nan),
+        np.full(shape, np.inf),
+        high + 1.0,
+        np.zeros((*shape, 1)),
+        np.zeros(0),
+        "x",
+        None,
+        good.astype(complex),
+        good.astype(bool),
+    ]
     for action in wrong:
         with pytest.raises(trueup.InputError) as error:
             env.step(action)
@@ -235,14 +262,52 @@ def test_whatever_the_interface_is_given_it_answers_or_raises():
     """Random calls with random arguments: an exception is fine, a crash or a hang is not, and what is good still works after."""
     rng = np.random.default_rng(1)
     things = [
-        None, 0, 1, -1, 2**70, -(2**70), 0.5, float("nan"), "", "x" * 1000, b"x", [], [0], [None], {}, {"reset_mask": 1}, (), object(), np.array(1),
-        np.zeros(1), np.zeros((3, 4)), np.zeros((3, 4), np.float32), np.array([True, False, True]), np.array(["a"]), np.zeros(3, np.int64),
-        np.zeros((3, 4), np.float32)[:, ::2], np.zeros(0), np.datetime64("2020-01-01"), int, lambda: 0, complex(1, 1),
+        None,
+        0,
+        1,
+        -1,
+        2**70,
+        -(2**70),
+        0.5,
+        float("nan"),
+        "",
+        "x" * 1000,
+        b"x",
+        [],
+        [0],
+        [None],
+        {},
+        {"reset_mask": 1},
+        (),
+        object(),
+        np.array(1),
+        np.zeros(1),
+        np.zeros((3, 4)),
+        np.zeros((3, 4), np.float32),
+        np.array([True, False, True]),
+        np.array(["a"]),
+        np.zeros(3, np.int64),
+        np.zeros((3, 4), np.float32)[:, ::2],
+        np.zeros(0),
+        np.datetime64("2020-01-01"),
+        int,
+        lambda: 0,
+        complex(1, 1),
     ]
     single, vector = envs.make(CART_POLE), envs.make_vec(CART_POLE, 3)
     for _ in range(4000):
         env = single if rng.random() < 0.5 else vector
-        method = ["reset", "step", "step_into", "restore", "branch_lane", "_lanes.step", "_lanes.reset", "_lanes.copy_lane", "make"][rng.integers(9)]
+        method = [
+            "reset",
+            "step",
+            "step_into",
+            "restore",
+            "branch_lane",
+            "_lanes.step",
+            "_lanes.reset",
+            "_lanes.copy_lane",
+            "make",
+        ][rng.integers(9)]
         arguments = [things[k] for k in rng.integers(len(things), size=rng.integers(0, 7))]
         keywords = {name: things[rng.integers(len(things))] for name in ("seed", "options", "num_envs", "threads") if rng.random() < 0.3}
         call = envs.make_vec if method == "make" else env

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 import threading
 import time
 
 import numpy as np
 import pytest
-import trueup
 
-import json
-import subprocess
-import sys
+import trueup
 
 
 class SmaCross(trueup.Strategy):
@@ -78,7 +78,9 @@ def test_the_same_run_gives_the_same_bits_and_values_change_it(bars_run):
 def test_what_is_written_is_what_the_command_writes(bars_run, tmp_path):
     paths = trueup.backtest(bars_run).write(tmp_path / "ours")
     assert {path.name for path in paths} >= {"run.json", "fills.parquet", "equity.parquet", "report.html"}
-    done = subprocess.run([sys.executable, "-m", "trueup", "backtest", str(bars_run), "--out", str(tmp_path / "theirs")], capture_output=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "trueup", "backtest", str(bars_run), "--out", str(tmp_path / "theirs")], capture_output=True
+    )
     assert done.returncode == 0, done.stderr
     for path in paths:
         assert path.read_bytes() == (tmp_path / "theirs" / path.name).read_bytes(), path.name
@@ -98,13 +100,18 @@ def test_bad_input_says_where_and_what_to_do(bars_run, tmp_path):
     with pytest.raises(FileNotFoundError) as missing:
         trueup.backtest(tmp_path / "nowhere.toml")
     assert isinstance(missing.value, trueup.InputError) and missing.value.path.endswith("nowhere.toml")
-    text = bars_run.read_text().replace('kind = "sma_cross"', 'kind = "sma_corss"').replace("bars.parquet", str(bars_run.parent / "bars.parquet"))
+    text = (
+        bars_run.read_text()
+        .replace('kind = "sma_cross"', 'kind = "sma_corss"')
+        .replace("bars.parquet", str(bars_run.parent / "bars.parquet"))
+    )
     (tmp_path / "run.toml").write_text(text)
     with pytest.raises(trueup.InputError) as wrong:
         trueup.backtest(tmp_path / "run.toml")
     assert "sma_cross" in wrong.value.hint and wrong.value.path.endswith("run.toml")
     assert "hint:" in str(wrong.value)
-    import copy, pickle
+    import copy
+    import pickle
 
     again = pickle.loads(pickle.dumps(wrong.value))
     assert (again.hint, again.path, str(again)) == (wrong.value.hint, wrong.value.path, str(wrong.value))
@@ -130,7 +137,11 @@ def test_what_a_strategy_raises_reaches_the_caller_with_a_note(bars_run):
 
 @pytest.mark.parametrize(
     ("strategy", "words"),
-    [(object(), "on_event"), (type("S", (trueup.Strategy,), {"lookback": 0})(), "lookback"), (type("S", (trueup.Strategy,), {"lookback": "x"})(), "lookback")],
+    [
+        (object(), "on_event"),
+        (type("S", (trueup.Strategy,), {"lookback": 0})(), "lookback"),
+        (type("S", (trueup.Strategy,), {"lookback": "x"})(), "lookback"),
+    ],
 )
 def test_what_is_no_strategy_is_refused(bars_run, strategy, words):
     with pytest.raises(trueup.InputError, match=words):

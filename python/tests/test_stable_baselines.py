@@ -51,7 +51,9 @@ class Double(ABC):
 @pytest.fixture(scope="module")
 def adapter():
     if importlib.util.find_spec("stable_baselines3") is None:
-        packages = {name: types.ModuleType(name) for name in ("stable_baselines3", "stable_baselines3.common", "stable_baselines3.common.vec_env")}
+        packages = {
+            name: types.ModuleType(name) for name in ("stable_baselines3", "stable_baselines3.common", "stable_baselines3.common.vec_env")
+        }
         packages["stable_baselines3.common.vec_env"].VecEnv = Double
         sys.modules.update(packages)
     return importlib.import_module("trueup.envs.stable_baselines").StableBaselines

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 import trueup
 from trueup.recording import columns_of
 
@@ -42,7 +43,12 @@ def test_columns_are_the_same_wherever_they_come_from(rng):
         "pandas": pd.DataFrame({"t": t, "q": q, "n": np.arange(10)}),
         "polars": pl.DataFrame({"t": t, "q": [None if np.isnan(v) else v for v in q], "n": np.arange(10)}),
         "pyarrow": pa.table({"t": t, "q": pa.array(q, from_pandas=True), "n": np.arange(10)}),
-        "chunks": pa.concat_tables([pa.table({"t": t[:4], "q": q[:4], "n": np.arange(4)}), pa.table({"t": t[4:], "q": q[4:], "n": np.arange(4, 10)})]),
+        "chunks": pa.concat_tables(
+            [
+                pa.table({"t": t[:4], "q": q[:4], "n": np.arange(4)}),
+                pa.table({"t": t[4:], "q": q[4:], "n": np.arange(4, 10)}),
+            ]
+        ),
     }
     for name, table in of.items():
         columns = columns_of(table)
@@ -63,7 +69,18 @@ def test_what_lies_as_it_should_is_not_copied():
 
 def test_arrow_types_of_all_kinds_are_read(rng):
     pa = pytest.importorskip("pyarrow")
-    kinds = [pa.float32(), pa.float16(), pa.int8(), pa.int16(), pa.int32(), pa.int64(), pa.uint8(), pa.uint16(), pa.uint32(), pa.uint64()]
+    kinds = [
+        pa.float32(),
+        pa.float16(),
+        pa.int8(),
+        pa.int16(),
+        pa.int32(),
+        pa.int64(),
+        pa.uint8(),
+        pa.uint16(),
+        pa.uint32(),
+        pa.uint64(),
+    ]
     for kind in kinds:
         values = np.array([1, 2, 3]) if not pa.types.is_float16(kind) else np.array([1, 2, 3], np.float16)
         table = pa.table({"a": pa.array(values, type=kind)})

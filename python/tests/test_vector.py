@@ -10,8 +10,9 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium")
 
-import trueup
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+import trueup
 from trueup import envs
 
 IDS = sorted(envs.ids())
@@ -38,7 +39,11 @@ def test_lanes_do_what_single_environments_do_side_by_side(identity, mode):
         _same(one, other, (identity, mode, number))
         over = one[2] | one[3]
         if mode is AutoresetMode.DISABLED and over.any():
-            _same(ours.reset(options={"reset_mask": over}), theirs.reset(options={"reset_mask": over.copy()}), (identity, number, "masked"))
+            _same(
+                ours.reset(options={"reset_mask": over}),
+                theirs.reset(options={"reset_mask": over.copy()}),
+                (identity, number, "masked"),
+            )
 
 
 def _same(ours, theirs, where):
@@ -58,7 +63,10 @@ def _same_info(ours, theirs, where):
         if isinstance(one, dict):
             _same_info(one, other, (where, name))
         elif one.dtype == object:
-            assert all(np.array_equal(a, b) if a is not None else b is None for a, b in zip(one, other, strict=True)), (where, name)
+            assert all(np.array_equal(a, b) if a is not None else b is None for a, b in zip(one, other, strict=True)), (
+                where,
+                name,
+            )
         elif not name.startswith("_") and f"_{name}" in ours:
             mask = ours[f"_{name}"]
             assert np.array_equal(one[mask], other[mask], equal_nan=True), (where, name)
@@ -170,7 +178,14 @@ def test_seeds_of_lanes():
     # A lane that is given none goes on to its next episode.
     mixed = env.reset(seed=[10, None, 12])[0]
     assert mixed[0].tobytes() == observations[0].tobytes() and mixed[1].tobytes() != observations[1].tobytes()
-    for wrong, words in [(-1, "at least 0"), ([1, 2], "2 seeds"), ("abc", "seed"), (1.5, "seed"), ([1, -2, 3], "at least 0"), (True, "seed")]:
+    for wrong, words in [
+        (-1, "at least 0"),
+        ([1, 2], "2 seeds"),
+        ("abc", "seed"),
+        (1.5, "seed"),
+        ([1, -2, 3], "at least 0"),
+        (True, "seed"),
+    ]:
         with pytest.raises(gymnasium.error.Error, match=words):
             env.reset(seed=wrong)
     assert np.isfinite(env.reset(seed=2**200)[0]).all()
@@ -195,7 +210,15 @@ def test_masks_that_are_none_are_refused():
 
 @pytest.mark.parametrize(
     "arguments",
-    [{"num_envs": 0}, {"num_envs": -3}, {"num_envs": 1.5}, {"num_envs": True}, {"threads": 0}, {"autoreset_mode": "Later"}, {"render_mode": "human"}],
+    [
+        {"num_envs": 0},
+        {"num_envs": -3},
+        {"num_envs": 1.5},
+        {"num_envs": True},
+        {"threads": 0},
+        {"autoreset_mode": "Later"},
+        {"render_mode": "human"},
+    ],
 )
 def test_what_cannot_be_made_is_refused(arguments):
     with pytest.raises(trueup.InputError) as error:
@@ -208,7 +231,17 @@ def test_actions_of_the_wrong_kind_are_refused_and_nothing_moves():
     with pytest.raises(trueup.InputError, match="has not been reset"):
         env.step(np.zeros(3, np.int64))
     env.reset(seed=0), twin.reset(seed=0)
-    for actions in [np.zeros(2, np.int64), np.zeros((3, 1), np.int64), np.zeros(3), [0, 1, 2], [0, 1, -1], 0, None, [[0], [1, 2], [3]], "010"]:
+    for actions in [
+        np.zeros(2, np.int64),
+        np.zeros((3, 1), np.int64),
+        np.zeros(3),
+        [0, 1, 2],
+        [0, 1, -1],
+        0,
+        None,
+        [[0], [1, 2], [3]],
+        "010",
+    ]:
         with pytest.raises(trueup.InputError):
             env.step(actions)
     good = np.array([0, 1, 0], np.int8)
@@ -263,6 +296,11 @@ def test_bound_buffers_are_read_and_written_in_place():
     made = envs.BoundEnvironment(CART_POLE, 2)
     made.reset(seed=1)
     assert made.step(np.array([0, 1]))[1] is made.rewards
-    for name, wrong in [("rewards", np.zeros(3)), ("actions", np.zeros(lanes)), ("observations", [[0.0]]), ("terminals", np.zeros(lanes, np.int64))]:
+    for name, wrong in [
+        ("rewards", np.zeros(3)),
+        ("actions", np.zeros(lanes)),
+        ("observations", [[0.0]]),
+        ("terminals", np.zeros(lanes, np.int64)),
+    ]:
         with pytest.raises(trueup.InputError, match=name):
             envs.BoundEnvironment(CART_POLE, lanes, **{name: wrong})

@@ -12,8 +12,8 @@ from ._trueup import Bars, Orders, Table, View, __version__
 from .diagnosis import Calibration, Diagnosis, calibrate, diagnose, mechanisms, prove
 from .document import Document
 from .errors import BugError, InputError, Mismatch, MissingFileError
-from .recording import ExecutionLog, Recording, write_table
 from .reconciliation import Reconciliation, assert_reconciles, reconcile
+from .recording import ExecutionLog, Recording, write_table
 from .run import Audit, Backtest, audit, backtest
 from .simulator import Initial, Parameter, ScriptDiagnosis, Simulator
 from .strategy import Strategy

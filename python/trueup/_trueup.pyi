@@ -157,7 +157,11 @@ class Lanes:
     def __init__(self, id: str, lanes: int, mode: str, threads: int, options: dict[str, Any]) -> None: ...
     def about(self) -> dict[str, Any]: ...
     def reset(
-        self, seeds: list[int] | None, mask: NDArray[np.bool_] | None, options: dict[str, Any], observations: NDArray[np.float32]
+        self,
+        seeds: list[int] | None,
+        mask: NDArray[np.bool_] | None,
+        options: dict[str, Any],
+        observations: NDArray[np.float32],
     ) -> None: ...
     def step(
         self,

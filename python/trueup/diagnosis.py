@@ -73,7 +73,11 @@ def diagnose(
     >>> diagnosis.verdict, diagnosis.mechanisms                                # doctest: +SKIP
     ('named', ['coulomb_friction'])
     """
-    with as_paths(recordings) as fitted, as_paths(holdout) as held_out, tempfile.TemporaryDirectory(prefix="trueup-") as spare:
+    with (
+        as_paths(recordings) as fitted,
+        as_paths(holdout) as held_out,
+        tempfile.TemporaryDirectory(prefix="trueup-") as spare,
+    ):
         folder = Path(spare) / "diagnosis" if out is None else Path(out)
         line = ["diagnose", os.fspath(twin), "--json", f"--seed={seed}", f"--out={folder}"]
         line += [f"--without={mechanism}" for mechanism in without]
@@ -97,7 +101,11 @@ def calibrate(
     progress: Progress | None = None,
 ) -> Calibration:
     """Fit the parameters a twin has to recordings, and add nothing to it. Arguments are those of `diagnose`; `out` is a TOML file."""
-    with as_paths(recordings) as fitted, as_paths(holdout) as held_out, tempfile.TemporaryDirectory(prefix="trueup-") as spare:
+    with (
+        as_paths(recordings) as fitted,
+        as_paths(holdout) as held_out,
+        tempfile.TemporaryDirectory(prefix="trueup-") as spare,
+    ):
         path = Path(spare) / "calibrated.toml" if out is None else Path(out)
         line = ["calibrate", os.fspath(twin), "--json", f"--seed={seed}", f"--out={path}"]
         line += [f"--recording={path}" for path in fitted] + [f"--holdout={path}" for path in held_out]

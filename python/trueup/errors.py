@@ -64,4 +64,6 @@ class Mismatch(AssertionError):
 def _again(kind, message, place):
     error = kind(message)
     error.__dict__.update(place)
+    if isinstance(error, OSError):
+        error.filename = error.path
     return error

@@ -23,7 +23,11 @@ def _array(name: str, values: Any) -> np.ndarray | list:
     """One column: float64, int64, datetime64[ns] or a list of texts."""
     values = np.asarray(values)
     if values.ndim != 1:
-        raise InputError(f"column `{name}` has the shape {values.shape}\n  hint: give one value a row", hint="give one value a row", column=name)
+        raise InputError(
+            f"column `{name}` has the shape {values.shape}\n  hint: give one value a row",
+            hint="give one value a row",
+            column=name,
+        )
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]")
     if values.dtype.kind == "f":
@@ -94,10 +98,16 @@ class Recording:
         self.name = str(name)
         lengths = {key: len(values) for key, values in self.columns.items()}
         if not lengths:
-            raise InputError("a recording without columns\n  hint: give at least t, a command and a channel", hint="give at least t, a command and a channel")
+            raise InputError(
+                "a recording without columns\n  hint: give at least t, a command and a channel",
+                hint="give at least t, a command and a channel",
+            )
         if len(set(lengths.values())) > 1:
             told = ", ".join(f"{key}: {length}" for key, length in lengths.items())
-            raise InputError(f"columns differ in length ({told})\n  hint: give one value a row in every column", hint="give one value a row in every column")
+            raise InputError(
+                f"columns differ in length ({told})\n  hint: give one value a row in every column",
+                hint="give one value a row in every column",
+            )
 
     @classmethod
     def read(cls, path: os.PathLike | str) -> Recording:
@@ -131,7 +141,16 @@ class ExecutionLog:
         What to call it in reports.
     """
 
-    def __init__(self, orders: Table, fills: Table, *, quotes: Table = None, trades: Table = None, bars: Table = None, name: str = "log"):
+    def __init__(
+        self,
+        orders: Table,
+        fills: Table,
+        *,
+        quotes: Table = None,
+        trades: Table = None,
+        bars: Table = None,
+        name: str = "log",
+    ):
         given = {"orders": orders, "fills": fills, "quotes": quotes, "trades": trades, "bars": bars}
         self.tables = {key: columns_of(table) for key, table in given.items() if table is not None}
         self.name = str(name)
@@ -178,4 +197,4 @@ def as_paths(recordings: Any) -> Iterator[list[str]]:
 
 
 def _file_name(name: str) -> str:
-    return "".join("_" if letter in '/\\:\0' else letter for letter in name) or "recording"
+    return "".join("_" if letter in "/\\:\0" else letter for letter in name) or "recording"

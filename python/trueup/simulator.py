@@ -50,15 +50,29 @@ class Parameter:
             if math.isnan(getattr(self, key)):
                 raise _wrong(f"parameter `{name}`: {key} is NaN", "give a number")
         if not self.lower <= self.value <= self.upper:
-            raise _wrong(f"parameter `{name}`: {self.value} is not within [{self.lower}, {self.upper}]", "move the bounds, or the value")
+            raise _wrong(
+                f"parameter `{name}`: {self.value} is not within [{self.lower}, {self.upper}]",
+                "move the bounds, or the value",
+            )
         std = self.std
         if std is None and prior and self.uncertainty is not None:
             std = abs(self.value) * self.uncertainty
             if std == 0 and self.uncertainty > 0:
-                raise _wrong(f"parameter `{name}` is 0 with a relative uncertainty", "give std, or uncertainty=None where nothing is known")
+                raise _wrong(
+                    f"parameter `{name}` is 0 with a relative uncertainty",
+                    "give std, or uncertainty=None where nothing is known",
+                )
         if std is not None and not std >= 0:
             raise _wrong(f"parameter `{name}`: a standard deviation of {std}", "it is at least 0; 0 where the value is known exactly")
-        return (name, self.unit, float(self.value), std, float(self.lower), float(self.upper), [float(start) for start in self.starts])
+        return (
+            name,
+            self.unit,
+            float(self.value),
+            std,
+            float(self.lower),
+            float(self.upper),
+            [float(start) for start in self.starts],
+        )
 
 
 @dataclass(frozen=True)
@@ -135,13 +149,19 @@ class Simulator:
             raise _wrong(f"`{min(both)}` is a parameter and of the initial state", "give it another name")
         for name, initial in self.initial.items():
             if initial.channel is not None and initial.channel not in self.channels:
-                raise _wrong(f"the initial state `{name}` is read off `{initial.channel}`, which is no channel", f"there are {', '.join(self.channels)}")
+                raise _wrong(
+                    f"the initial state `{name}` is read off `{initial.channel}`, which is no channel",
+                    f"there are {', '.join(self.channels)}",
+                )
         mechanisms = []
         for identity, parameters in self.mechanisms.items():
             rows = [parameter._row(name, prior=False) for name, parameter in parameters.items()]
             for name, parameter in parameters.items():
                 if not any(start != parameter.value for start in parameter.starts):
-                    raise _wrong(f"`{identity}.{name}` has no start at which it does something", "starts=[...], beside the value at which it does nothing")
+                    raise _wrong(
+                        f"`{identity}.{name}` has no start at which it does something",
+                        "starts=[...], beside the value at which it does nothing",
+                    )
             mechanisms.append((identity, rows))
         self._scripted = _trueup.ScriptedSimulator(
             self.follow,
@@ -157,7 +177,11 @@ class Simulator:
     def _rows(self, recordings: Any) -> list[tuple]:
         if recordings is None:
             return []
-        if isinstance(recordings, (str, Recording, Mapping)) or hasattr(recordings, "__arrow_c_stream__") or hasattr(recordings, "__fspath__"):
+        if (
+            isinstance(recordings, (str, Recording, Mapping))
+            or hasattr(recordings, "__arrow_c_stream__")
+            or hasattr(recordings, "__fspath__")
+        ):
             recordings = [recordings]
         return [self._row(number, recording) for number, recording in enumerate(recordings)]
 
@@ -170,17 +194,26 @@ class Simulator:
         def column(name: str) -> np.ndarray:
             wanted = self.columns.get(name, name)
             if wanted not in recording.columns:
-                raise _wrong(f"{recording.name}: there is no column `{wanted}`", f"there are {', '.join(recording.columns)}; columns={{...}} says which is which")
+                raise _wrong(
+                    f"{recording.name}: there is no column `{wanted}`",
+                    f"there are {', '.join(recording.columns)}; columns={{...}} says which is which",
+                )
             return np.ascontiguousarray(recording.columns[wanted], dtype=np.float64)
 
         time = column("t")
         if len(time) < 2 or not np.all(np.isfinite(time)) or not np.all(np.diff(time) > 0):
-            raise _wrong(f"{recording.name}: `t` does not increase from row to row, or is too short", "at least 2 rows, in seconds, strictly increasing")
+            raise _wrong(
+                f"{recording.name}: `t` does not increase from row to row, or is too short",
+                "at least 2 rows, in seconds, strictly increasing",
+            )
         inputs = [column(name) for name in self.inputs]
         for name, values in zip(self.inputs, inputs, strict=True):
             if not np.all(np.isfinite(values)):
                 row = int(np.flatnonzero(~np.isfinite(values))[0])
-                raise _wrong(f"{recording.name}: input `{name}` is {values[row]} in row {row}", "what drives a simulator is known in every row: leave such stretches out")
+                raise _wrong(
+                    f"{recording.name}: input `{name}` is {values[row]} in row {row}",
+                    "what drives a simulator is known in every row: leave such stretches out",
+                )
         channels = [column(name) for name in self.channels]
         for name, values in zip(self.channels, channels, strict=True):
             if not np.any(np.isfinite(values)):

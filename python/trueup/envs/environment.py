@@ -106,9 +106,10 @@ class Environment(gymnasium.Env):
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to `snapshot`: what follows has the same bits as what followed then, for the same actions."""
-        if snapshot.identity != self._identity or snapshot._kept.get("options") != self._options:
+        fits = isinstance(snapshot, Snapshot) and snapshot.identity == self._identity and "settings" not in snapshot._kept
+        if not fits or snapshot._kept["options"] != self._options:
             hint = "restore snapshots of environments made alike"
-            raise seeds.InputError(f"a snapshot of {snapshot.identity} is none of {self._identity}\n  hint: {hint}", hint=hint)
+            raise seeds.InputError(f"{snapshot!r} is no snapshot of {self}\n  hint: {hint}", hint=hint)
         self._lanes = snapshot._lanes.copy()
         self._np_random, self._np_random_seed = copy.deepcopy(snapshot._kept["np_random"]), snapshot._kept["np_random_seed"]
         self._seeded = snapshot._kept["seeded"]

@@ -14,9 +14,7 @@ from .vector import VectorEnvironment
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise ImportError(
-        "trueup.envs.stable_baselines needs stable-baselines3\n  hint: pip install stable-baselines3"
-    ) from error
+    raise ImportError("trueup.envs.stable_baselines needs stable-baselines3\n  hint: pip install stable-baselines3") from error
 
 
 class StableBaselines(VecEnv):
@@ -74,7 +72,9 @@ class StableBaselines(VecEnv):
             raise NotImplementedError("lanes share their attributes\n  hint: set it of all, with indices=None")
         setattr(self.env, attr_name, value)
 
-    def env_method(self, method_name: str, *method_args: Any, indices: None | int | Iterable[int] = None, **method_kwargs: Any) -> list[Any]:
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: None | int | Iterable[int] = None, **method_kwargs: Any
+    ) -> list[Any]:
         """Call a method of the vector environment, once, and give its result for each of `indices`: lanes have no methods of their own."""
         result = getattr(self.env, method_name)(*method_args, **method_kwargs)
         return [copy.copy(result) for _ in self._chosen(indices)]

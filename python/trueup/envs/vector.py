@@ -145,8 +145,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv):
     ) -> dict[str, Any]:
         """Take a step in every lane, and write what comes of it into arrays of the caller's (C-contiguous; float32 of the space's shape,
         float64, bool, bool of the shape (num_envs,)); gives the info. After an error they hold what they held."""
-        if observations.shape != self.observation_space.shape:
-            raise _wrong(f"observations have the shape {observations.shape}", f"{self.observation_space.shape} is asked for")
+        if getattr(observations, "shape", None) != self.observation_space.shape:
+            raise _wrong(f"observations have the shape {np.shape(observations)}", f"{self.observation_space.shape} is asked for")
         self._lanes.step(self._read(actions), observations, rewards, terminations, truncations)
         # A reset with a mask gives the rows of other lanes as they are. Where such resets are the rule, nobody else may change these.
         self._observed = observations.copy() if self.autoreset_mode is AutoresetMode.DISABLED else observations
@@ -183,6 +183,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv):
             "observed": None if getattr(self, "_observed", None) is None else self._observed.copy(),
             "np_random": copy.deepcopy(self._np_random),
             "np_random_seed": self._np_random_seed,
+            "options": dict(self._options),
             "settings": {name: self._settings[name] for name in ("num_envs", "autoreset_mode")},
         }
         return Snapshot(self._identity, self._lanes.copy(), kept)
@@ -190,8 +191,9 @@ class VectorEnvironment(gymnasium.vector.VectorEnv):
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to `snapshot`: what follows has the same bits as what followed then, for the same actions."""
         own = {name: self._settings[name] for name in ("num_envs", "autoreset_mode")}
-        if snapshot.identity != self._identity or snapshot._kept.get("settings") != own:
-            raise _wrong(f"a snapshot of {snapshot.identity} is none of these lanes", "restore snapshots of environments made alike")
+        fits = isinstance(snapshot, Snapshot) and snapshot.identity == self._identity
+        if not fits or snapshot._kept["options"] != self._options or snapshot._kept.get("settings") != own:
+            raise _wrong(f"{snapshot!r} is no snapshot of these lanes", "restore snapshots of environments made alike")
         self._lanes = snapshot._lanes.copy()
         kept = snapshot._kept
         self._seeded = kept["seeded"].copy()
