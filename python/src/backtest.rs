@@ -39,7 +39,9 @@ impl Outputs {
             "fills" => &self.outputs.fills,
             "trades" => &self.outputs.trades,
             "equity" => &self.outputs.equity,
-            other => return Err(error::refused(py, &format!("there is no table `{other}`"), "orders, fills, trades or equity")),
+            other => {
+                return Err(error::refused(py, &format!("there is no table `{other}`"), "orders, fills, trades or equity"));
+            }
         };
         Table::of(table).map_err(|error| error::bug(py, &error.to_string()))
     }
@@ -92,7 +94,8 @@ fn toml_value(py: Python<'_>, value: &Bound<'_, PyAny>) -> PyResult<toml::Value>
         value if value.is_instance_of::<PyFloat>() => toml::Value::Float(value.extract()?),
         value if value.is_instance_of::<PyString>() => toml::Value::String(value.extract()?),
         other => {
-            let message = format!("a value of a run is a number, a truth value or a text, found {}", other.get_type().name()?);
+            let message =
+                format!("a value of a run is a number, a truth value or a text, found {}", other.get_type().name()?);
             return Err(error::refused(py, &message, "such as values={\"strategy.fast\": 12}"));
         }
     })
@@ -124,7 +127,8 @@ fn run(
     }
     let (done, of) = session.progress();
     look(done, of)?;
-    let shown = |record| prepared.outputs(&record).map_err(|error| InputError::new(file.document().path(), error.to_string()));
+    let shown =
+        |record| prepared.outputs(&record).map_err(|error| InputError::new(file.document().path(), error.to_string()));
     Ok(session.finish().map_err(|error| explained(file, &error)).and_then(shown))
 }
 

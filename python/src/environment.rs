@@ -3,14 +3,16 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArray1, PyReadwriteArrayDyn};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArray1, PyReadwriteArrayDyn,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 use trueup::io::{RunFile, hint_among};
 use trueup::market::env::{MarketSetup, make_on};
 use trueup::rl::{
-    About, Actions, AutoresetMode, BoxSpace, Checked, EnvEntry, EnvError, InfoChannel, Occasion, OptionKind, OptionValue, Options,
-    Out, Space, Threads, VecEnv, Which,
+    About, Actions, AutoresetMode, BoxSpace, Checked, EnvEntry, EnvError, InfoChannel, Occasion, OptionKind, OptionValue,
+    Options, Out, Space, Threads, VecEnv, Which,
 };
 
 use crate::error;
@@ -71,7 +73,14 @@ impl Lanes {
     /// "SameStep" or "Disabled". Beside the environment's own options, one of a market has `run`: the path of the RUN.toml whose data and
     /// venue it is in.
     #[new]
-    fn new(py: Python<'_>, id: &str, lanes: usize, mode: &str, threads: usize, options: &Bound<'_, PyDict>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        id: &str,
+        lanes: usize,
+        mode: &str,
+        threads: usize,
+        options: &Bound<'_, PyDict>,
+    ) -> PyResult<Self> {
         let entry = entries().find(|entry| entry.id == id).ok_or_else(|| {
             let ids: Vec<&str> = entries().map(|entry| entry.id).collect();
             error::refused(py, &format!("there is no environment `{id}`"), &hint_among(id, &ids).unwrap_or_default())
@@ -81,7 +90,11 @@ impl Lanes {
             "SameStep" => AutoresetMode::SameStep,
             "Disabled" => AutoresetMode::Disabled,
             other => {
-                return Err(error::refused(py, &format!("there is no autoreset mode {other:?}"), "NextStep, SameStep or Disabled"));
+                return Err(error::refused(
+                    py,
+                    &format!("there is no autoreset mode {other:?}"),
+                    "NextStep, SameStep or Disabled",
+                ));
             }
         };
         let mut options = options_of(py, options)?;
@@ -243,7 +256,11 @@ fn options_of(py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<Options> {
     let mut options = Options::new();
     for (name, value) in given {
         let Ok(name) = name.extract::<String>() else {
-            return Err(error::refused(py, &format!("an option is called {}", name.repr()?), "options have texts for names"));
+            return Err(error::refused(
+                py,
+                &format!("an option is called {}", name.repr()?),
+                "options have texts for names",
+            ));
         };
         let value: OptionValue = match &value {
             value if value.is_instance_of::<PyBool>() => value.extract::<bool>()?.into(),
@@ -252,7 +269,9 @@ fn options_of(py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<Options> {
             other => match other.call_method0("item") {
                 // A scalar of NumPy.
                 Ok(item) if item.is_instance_of::<PyBool>() => item.extract::<bool>()?.into(),
-                Ok(item) if item.is_instance_of::<PyFloat>() || item.is_instance_of::<PyInt>() => item.extract::<f64>()?.into(),
+                Ok(item) if item.is_instance_of::<PyFloat>() || item.is_instance_of::<PyInt>() => {
+                    item.extract::<f64>()?.into()
+                }
                 _ => {
                     let message = format!("option `{name}` is {}", other.repr()?);
                     return Err(error::refused(py, &message, "an option is a number, a truth value or a text"));

@@ -3,9 +3,7 @@
 use std::collections::HashMap;
 
 use pyo3::prelude::*;
-use trueup::market::{
-    Condition, Instrument, OrderId, OrderKind, Orders, Price, Quantity, Side, Ticket, TimeInForce, View,
-};
+use trueup::market::{Condition, Instrument, OrderId, OrderKind, Orders, Price, Quantity, Side, Ticket, TimeInForce, View};
 use trueup::sim2real::Timestamp;
 
 use crate::error;
@@ -41,7 +39,11 @@ impl OrderBook {
 
     fn open(&mut self, py: Python<'_>) -> PyResult<&mut Orders> {
         self.orders.as_mut().ok_or_else(|| {
-            error::refused(py, "these orders are of an event that is over", "use those that the call was given, and keep none")
+            error::refused(
+                py,
+                "these orders are of an event that is over",
+                "use those that the call was given, and keep none",
+            )
         })
     }
 
@@ -107,7 +109,9 @@ impl OrderBook {
             "day" => TimeInForce::Day,
             "ioc" => TimeInForce::ImmediateOrCancel,
             "fok" => TimeInForce::FillOrKill,
-            other => return Err(error::refused(py, &format!("there is no time in force {other:?}"), "gtc, day, ioc or fok")),
+            other => {
+                return Err(error::refused(py, &format!("there is no time in force {other:?}"), "gtc, day, ioc or fok"));
+            }
         };
         let condition = match condition {
             None => Condition::None,
@@ -130,7 +134,14 @@ impl OrderBook {
     }
 
     /// Asks for a limit order that works until it is filled or cancelled.
-    fn limit(&mut self, py: Python<'_>, instrument: &Bound<'_, PyAny>, side: &str, quantity: f64, price: f64) -> PyResult<u64> {
+    fn limit(
+        &mut self,
+        py: Python<'_>,
+        instrument: &Bound<'_, PyAny>,
+        side: &str,
+        quantity: f64,
+        price: f64,
+    ) -> PyResult<u64> {
         let instrument = self.number(py, instrument)?;
         let (side, quantity, price) = (side_of(py, side)?, self::quantity(py, quantity)?, self::price(py, price)?);
         Ok(self.open(py)?.limit(instrument, side, quantity, price).0)
@@ -138,7 +149,8 @@ impl OrderBook {
 
     /// Asks for the market order that takes the position, with what is on its way, to `target` [units]; for none where it is there
     /// already. `view` is the one that came with these orders. Gives the id, where there is an order.
-    fn to_position(
+    #[pyo3(name = "to_position")]
+    fn bring_to(
         &mut self,
         py: Python<'_>,
         view: &Bound<'_, Sight>,

@@ -58,7 +58,13 @@ pub struct Script {
 
 impl Script {
     /// Follows `rows` in every lane; one call a lane, or one for all where the callable is vectorized.
-    fn followed(&self, py: Python<'_>, thetas: &Thetas, recording: &Recording<Inputs>, rows: Range<usize>) -> PyResult<Vec<Trajectory>> {
+    fn followed(
+        &self,
+        py: Python<'_>,
+        thetas: &Thetas,
+        recording: &Recording<Inputs>,
+        rows: Range<usize>,
+    ) -> PyResult<Vec<Trajectory>> {
         let time = PyArray1::from_slice(py, &recording.time[rows.clone()]);
         let inputs = PyDict::new(py);
         for ((name, _), values) in self.inputs.iter().zip(recording.stimulus.0.iter()) {
@@ -89,7 +95,8 @@ impl Script {
     fn lane(&self, py: Python<'_>, result: &Bound<'_, PyAny>, rows: usize) -> PyResult<Trajectory> {
         let of = |channel: &Channel| {
             let values = self.values(py, result, channel)?;
-            let array: PyReadonlyArray1<'_, f64> = values.extract().map_err(|_| self.misshapen(py, channel, &values, &format!("({rows},)")))?;
+            let array: PyReadonlyArray1<'_, f64> =
+                values.extract().map_err(|_| self.misshapen(py, channel, &values, &format!("({rows},)")))?;
             if array.len() != rows {
                 return Err(self.misshapen(py, channel, &values, &format!("({rows},)")));
             }
@@ -104,7 +111,8 @@ impl Script {
         for channel in &self.channels {
             let values = self.values(py, result, channel)?;
             let expected = format!("({lanes}, {rows})");
-            let array: PyReadonlyArray2<'_, f64> = values.extract().map_err(|_| self.misshapen(py, channel, &values, &expected))?;
+            let array: PyReadonlyArray2<'_, f64> =
+                values.extract().map_err(|_| self.misshapen(py, channel, &values, &expected))?;
             if array.shape() != [lanes, rows] {
                 return Err(self.misshapen(py, channel, &values, &expected));
             }
@@ -132,7 +140,8 @@ impl Script {
     }
 
     fn misshapen(&self, py: Python<'_>, channel: &Channel, values: &Bound<'_, PyAny>, expected: &str) -> PyErr {
-        let shape = values.getattr("shape").and_then(|shape| shape.repr()).map_or_else(|_| "?".to_owned(), |text| text.to_string());
+        let shape =
+            values.getattr("shape").and_then(|shape| shape.repr()).map_or_else(|_| "?".to_owned(), |text| text.to_string());
         let message = format!("{}: channel `{}` has the shape {shape}, expected {expected}", self.name, channel.name);
         error::refused(py, &message, "give one sample for each row of `time`")
     }
@@ -156,7 +165,8 @@ fn around(recording: &Recording<Inputs>, measured: &Measured, row: usize) -> Opt
 
 /// Root mean square of the values of a channel about their mean, or of its slope from sample to sample.
 fn spread(recording: &Recording<Inputs>, measured: &Measured, derivative: bool) -> f64 {
-    let present: Vec<(f64, f64)> = recording.time.iter().zip(&measured.samples).filter_map(|(t, y)| Some((*t, (*y)?))).collect();
+    let present: Vec<(f64, f64)> =
+        recording.time.iter().zip(&measured.samples).filter_map(|(t, y)| Some((*t, (*y)?))).collect();
     let values: Vec<f64> = match derivative {
         false => present.iter().map(|point| point.1).collect(),
         true => present.windows(2).map(|w| (w[1].1 - w[0].1) / (w[1].0 - w[0].0)).collect(),

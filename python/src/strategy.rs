@@ -57,7 +57,11 @@ impl Guest {
         let lookback = match object.getattr_opt("lookback")? {
             None => 1,
             Some(lookback) => lookback.extract::<usize>().ok().filter(|rows| *rows >= 1).ok_or_else(|| {
-                error::refused(py, &format!("the lookback of {kind} is {lookback}"), "it is a whole number of rows, at least 1")
+                error::refused(
+                    py,
+                    &format!("the lookback of {kind} is {lookback}"),
+                    "it is a whole number of rows, at least 1",
+                )
             })?,
         };
         let name = match object.getattr_opt("name")? {

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow_array::{
-    Array, ArrayRef, ArrowPrimitiveType, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray,
-    TimestampNanosecondArray, types,
+    Array, ArrayRef, ArrowPrimitiveType, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, RecordBatchReader,
+    StringArray, TimestampNanosecondArray, types,
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
 use numpy::{PyArray1, PyReadonlyArray1};
@@ -145,7 +145,8 @@ pub fn columns_of<'py>(py: Python<'py>, table: &Bound<'py, PyAny>) -> PyResult<B
     // and leaves a released one behind, which the capsule's destructor does not release again.
     #[allow(unsafe_code)]
     let reader = unsafe { RecordBatchStreamReader::from_raw(stream.as_ptr().cast()) };
-    let unreadable = |error: ArrowError| error::refused(py, &format!("the Arrow stream cannot be read ({error})"), "is it whole?");
+    let unreadable =
+        |error: ArrowError| error::refused(py, &format!("the Arrow stream cannot be read ({error})"), "is it whole?");
     let reader = reader.map_err(unreadable)?;
     let schema = reader.schema();
     let batches = reader.collect::<Result<Vec<RecordBatch>, ArrowError>>().map_err(unreadable)?;
@@ -166,7 +167,8 @@ fn joined<'py>(py: Python<'py>, field: &Field, parts: &[&ArrayRef]) -> PyResult<
         return PyArray1::from_vec(py, times).call_method1("view", ("datetime64[ns]",));
     }
     let Some(texts) = texts(field.data_type(), parts) else {
-        let message = format!("column `{}` holds {}, which is neither numbers nor times nor texts", field.name(), field.data_type());
+        let message =
+            format!("column `{}` holds {}, which is neither numbers nor times nor texts", field.name(), field.data_type());
         return Err(error::refused(py, &message, "convert the column, or leave it out"));
     };
     py.import("numpy")?.call_method1("array", (PyList::new(py, texts)?, "object"))
@@ -217,7 +219,8 @@ fn counts<T: ArrowPrimitiveType>(parts: &[&ArrayRef], nanoseconds: i64) -> Vec<i
 where
     i64: From<T::Native>,
 {
-    let count = |value: Option<T::Native>| value.and_then(|value| i64::from(value).checked_mul(nanoseconds)).unwrap_or(i64::MIN);
+    let count =
+        |value: Option<T::Native>| value.and_then(|value| i64::from(value).checked_mul(nanoseconds)).unwrap_or(i64::MIN);
     parts.iter().flat_map(|part| part.as_primitive::<T>().iter().map(count)).collect()
 }
 
@@ -238,14 +241,21 @@ fn texts(kind: &DataType, parts: &[&ArrayRef]) -> Option<Vec<Option<String>>> {
 /// datetime64[ns] viewed as int64 under a name in `times`, and lists of texts.
 #[pyfunction]
 #[pyo3(signature = (path, columns, times, force=false))]
-pub fn write_columns(py: Python<'_>, path: PathBuf, columns: &Bound<'_, PyDict>, times: HashSet<String>, force: bool) -> PyResult<()> {
+pub fn write_columns(
+    py: Python<'_>,
+    path: PathBuf,
+    columns: &Bound<'_, PyDict>,
+    times: HashSet<String>,
+    force: bool,
+) -> PyResult<()> {
     let mut table = OutputTable::new();
     for (name, values) in columns {
         let name: String = name.extract()?;
         let values = if let Ok(numbers) = values.extract::<PyReadonlyArray1<'_, f64>>() {
             Values::Floats(numbers.as_array().iter().map(|value| Some(*value).filter(|value| !value.is_nan())).collect())
         } else if let Ok(counts) = values.extract::<PyReadonlyArray1<'_, i64>>() {
-            let present = counts.as_array().iter().map(|count| Some(*count).filter(|count| *count != i64::MIN)).collect::<Vec<_>>();
+            let present =
+                counts.as_array().iter().map(|count| Some(*count).filter(|count| *count != i64::MIN)).collect::<Vec<_>>();
             match times.contains(&name) {
                 true => Values::Times(present.into_iter().map(|count| count.map(Timestamp)).collect()),
                 false => Values::Integers(present),

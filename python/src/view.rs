@@ -100,7 +100,8 @@ impl Sight {
         let symbols = match &eyes.symbols {
             Some(symbols) => symbols.clone_ref(py),
             None => {
-                let symbols = PyTuple::new(py, view.instruments().iter().map(|instrument| instrument.symbol.as_str()))?.unbind();
+                let symbols =
+                    PyTuple::new(py, view.instruments().iter().map(|instrument| instrument.symbol.as_str()))?.unbind();
                 eyes.symbols.insert(symbols).clone_ref(py)
             }
         };
@@ -150,7 +151,8 @@ impl Sight {
         }
         let symbols = self.symbols.bind(py);
         if let Ok(symbol) = instrument.extract::<String>()
-            && let Some(number) = symbols.iter().position(|known| known.extract::<String>().is_ok_and(|known| known == symbol))
+            && let Some(number) =
+                symbols.iter().position(|known| known.extract::<String>().is_ok_and(|known| known == symbol))
         {
             return Ok(number);
         }
@@ -285,7 +287,11 @@ impl Sight {
         let known = self.of_instrument(py, instrument)?;
         let (Some(value), Some(steps)) = (known.unit_value, known.steps) else { return Ok(0.0) };
         let units = amount / value;
-        let lots = if units > 0.0 { Quantity::nearest(units).map_or(Quantity::ZERO, |q| steps.whole_lots(q)) } else { Quantity::ZERO };
+        let lots = if units > 0.0 {
+            Quantity::nearest(units).map_or(Quantity::ZERO, |q| steps.whole_lots(q))
+        } else {
+            Quantity::ZERO
+        };
         Ok(lots.to_f64())
     }
 

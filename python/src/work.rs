@@ -62,7 +62,8 @@ impl Course {
         Arc::new(move |step, done, of| {
             course.check();
             if let Ok(mut last) = last.lock() {
-                let recent = last.as_ref().is_some_and(|(then, at)| then == step && at.elapsed() < Duration::from_millis(100));
+                let recent =
+                    last.as_ref().is_some_and(|(then, at)| then == step && at.elapsed() < Duration::from_millis(100));
                 if recent {
                     return;
                 }

@@ -51,7 +51,10 @@ impl fmt::Display for Refusal {
 ///
 /// # Errors
 /// As the command line ends with another exit code than 0 and 1.
-pub fn answer(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, listener: Listener) -> Result<Answer, Refusal> {
+pub fn answer(
+    arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    listener: Listener,
+) -> Result<Answer, Refusal> {
     let line = Line::try_parse_from(arguments).map_err(|error| Refusal::Usage(error.to_string()))?;
     let screen = Screen::collecting(listener);
     match line.command.run(&screen) {
@@ -80,7 +83,9 @@ mod tests {
 
     #[test]
     fn a_refusal_says_what_the_terminal_would_have_been_told() {
-        let Err(Refusal::Input(error)) = answer(["trueup", "audit", "nowhere.toml"], silent()) else { panic!("no such file") };
+        let Err(Refusal::Input(error)) = answer(["trueup", "audit", "nowhere.toml"], silent()) else {
+            panic!("no such file")
+        };
         assert_eq!(error.path, std::path::Path::new("nowhere.toml"));
         let Err(Refusal::Usage(text)) = answer(["trueup", "audti"], silent()) else { panic!("no such command") };
         assert!(text.contains("audit"), "{text}");
