@@ -7,6 +7,7 @@ mod backtest;
 mod command;
 mod environment;
 mod error;
+mod initial;
 mod orders;
 mod simulator;
 mod strategy;

@@ -15,27 +15,9 @@ use trueup::sim2real::{
     Trajectory, Twin,
 };
 
+use crate::initial::{Initial, Inputs, around, rounding};
 use crate::work::Course;
 use crate::{error, work};
-
-/// Rows on either side of one by which a state is estimated there.
-const AROUND: usize = 5;
-
-/// What drives a simulator of Python: its inputs, one value a row each.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Inputs(Arc<Vec<Vec<f64>>>);
-
-/// A parameter of the state a run starts from: what it is estimated by, and how far that may be off.
-#[derive(Clone)]
-struct Initial {
-    name: String,
-    unit: String,
-    value: f64,
-    /// The channel it is read off, or the derivative of which it is.
-    channel: Option<String>,
-    derivative: bool,
-    std: Option<f64>,
-}
 
 /// A callable of Python as a simulator. What it is asked for while the lock of Python is not held, it takes the lock for.
 #[derive(Clone)]
@@ -145,35 +127,6 @@ impl Script {
         let message = format!("{}: channel `{}` has the shape {shape}, expected {expected}", self.name, channel.name);
         error::refused(py, &message, "give one sample for each row of `time`")
     }
-
-    fn measured<'r>(recording: &'r Recording<Inputs>, channel: Option<&String>) -> Option<&'r Measured> {
-        recording.channel(channel?)
-    }
-}
-
-/// Value and slope at `row` of a line through the samples around it.
-fn around(recording: &Recording<Inputs>, measured: &Measured, row: usize) -> Option<(f64, f64)> {
-    let rows = row.saturating_sub(AROUND)..(row + AROUND + 1).min(recording.len());
-    let at = recording.time.get(row)?;
-    let points: Vec<(f64, f64)> = rows.filter_map(|k| Some((recording.time[k] - at, measured.samples[k]?))).collect();
-    let count = points.len() as f64;
-    let (t, y) = points.iter().fold((0.0, 0.0), |(t, y), point| (t + point.0 / count, y + point.1 / count));
-    let (tt, ty) = points.iter().fold((0.0, 0.0), |(tt, ty), p| (tt + (p.0 - t) * (p.0 - t), ty + (p.0 - t) * (p.1 - y)));
-    let slope = if tt > 0.0 { ty / tt } else { 0.0 };
-    (!points.is_empty()).then_some((y - slope * t, slope))
-}
-
-/// Root mean square of the values of a channel about their mean, or of its slope from sample to sample.
-fn spread(recording: &Recording<Inputs>, measured: &Measured, derivative: bool) -> f64 {
-    let present: Vec<(f64, f64)> =
-        recording.time.iter().zip(&measured.samples).filter_map(|(t, y)| Some((*t, (*y)?))).collect();
-    let values: Vec<f64> = match derivative {
-        false => present.iter().map(|point| point.1).collect(),
-        true => present.windows(2).map(|w| (w[1].1 - w[0].1) / (w[1].0 - w[0].0)).collect(),
-    };
-    let count = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    (values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / count).sqrt()
 }
 
 impl Simulator for Script {
@@ -197,29 +150,11 @@ impl Simulator for Script {
     }
 
     fn initial_parameters(&self, recording: &Recording<Inputs>, row: usize) -> Vec<Parameter> {
-        let one = |initial: &Initial| {
-            let measured = Self::measured(recording, initial.channel.as_ref());
-            let seen = measured.and_then(|measured| around(recording, measured, row));
-            let value = seen.map_or(initial.value, |(value, slope)| if initial.derivative { slope } else { value });
-            let typical = measured.map(|measured| 0.3 * spread(recording, measured, initial.derivative));
-            let parameter = Parameter::named(initial.name.clone(), initial.unit.clone(), value);
-            match initial.std.or(typical) {
-                Some(std) => parameter.known_to(if initial.std.is_some() { std } else { std.max(1e-9) }),
-                None => parameter,
-            }
-        };
-        self.initial.iter().map(one).collect()
+        self.initial.iter().map(|initial| initial.at(recording, row)).collect()
     }
 
     fn resolution(&self, recording: &Recording<Inputs>, channel: &str) -> f64 {
-        // Steps in which a sensor counts: nine in ten changes are whole multiples of the smallest.
-        let Some(measured) = recording.channel(channel) else { return 0.0 };
-        let changes: Vec<f64> = measured.samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs())).collect();
-        let largest = changes.iter().copied().fold(0.0, f64::max);
-        let changes: Vec<f64> = changes.into_iter().filter(|change| *change > 1e-9 * largest).collect();
-        let step = changes.iter().copied().fold(f64::INFINITY, f64::min);
-        let whole = changes.iter().filter(|change| ((**change / step) - (**change / step).round()).abs() < 1e-3).count();
-        if !changes.is_empty() && 10 * whole >= 9 * changes.len() { step / 12.0_f64.sqrt() } else { 0.0 }
+        recording.channel(channel).map_or(0.0, rounding)
     }
 
     fn covariates(&self, recording: &Recording<Inputs>) -> Vec<Covariate> {
