@@ -1,5 +1,7 @@
 //! `check_env` passes what keeps the contract, alone and in every wrapper, and finds each fault that is planted.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it fails")]
+
 use trueup::rl::wrapper::{
     ActionLatency, ActionScale, ClipActions, Dropout, EpisodeStatistics, ForbiddenZone, Intervention, Latency, Lost,
     ObservationLatency, ObservationNoise, RateLimit, Recorder, Redraw, Smoothing, ZoneOf,

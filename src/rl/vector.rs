@@ -94,9 +94,16 @@ pub fn alike<'a, E: VecEnv>(this: &E, other: &'a dyn VecEnv) -> Result<&'a E, En
     let unlike = |why| Err(EnvError::Unlike { id: this.about().id.clone(), why });
     match (unboxed(other) as &dyn Any).downcast_ref::<E>() {
         Some(other) if other.about().id != this.about().id => unlike(format!("it is `{}`", other.about().id)),
+        Some(other) if sizes(other.about()) != sizes(this.about()) => {
+            unlike("its observations, actions or info are of another size".into())
+        }
         Some(other) => Ok(other),
         None => unlike(format!("it is `{}`, or has other wrappers", other.about().id)),
     }
+}
+
+fn sizes(about: &About) -> [usize; 4] {
+    [about.observation.size(), about.action.size(), about.info.len(), about.privileged.len()]
 }
 
 /// What is within boxes.

@@ -101,7 +101,7 @@ impl<T: Copy + Default> Way<T> {
 
 /// A latency [steps] to the nearest part.
 fn in_parts(steps: f64, parts: usize) -> u64 {
-    (steps * parts as f64).round() as u64
+    (steps * parts as f64 + 0.5) as u64
 }
 
 impl<E: VecEnv> ActionLatency<E> {

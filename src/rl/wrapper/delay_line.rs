@@ -1,15 +1,16 @@
 //! Messages under way.
 
+use super::layer::copy_row;
+
 /// Rows of `size` numbers that arrive some time after they were sent, a line a lane. What counts is the last that was sent of those
 /// that have arrived.
 #[derive(Debug, Clone)]
 pub(super) struct DelayLine<T> {
-    lanes: usize,
     size: usize,
     depth: usize,
-    /// Messages: shape (depth, lanes, size).
+    /// Messages: shape (lanes, depth, size).
     rows: Vec<T>,
-    /// When each arrives: shape (depth, lanes).
+    /// When each arrives: shape (lanes, depth).
     due: Vec<u64>,
     /// How many messages each lane has sent since the one it began with, which is number 0.
     sent: Vec<u64>,
@@ -20,9 +21,9 @@ pub(super) struct DelayLine<T> {
 impl<T: Copy + Default> DelayLine<T> {
     /// Lines on which a message is overtaken by the next `longest` at the most.
     pub fn new(lanes: usize, size: usize, longest: usize) -> Self {
-        let depth = longest + 2;
+        // A power of two, for places by a mask, not by a division.
+        let depth = (longest + 2).next_power_of_two();
         Self {
-            lanes,
             size,
             depth,
             rows: vec![T::default(); depth * lanes * size],
@@ -34,14 +35,15 @@ impl<T: Copy + Default> DelayLine<T> {
 
     /// The place of message `number` of `lane`.
     fn place(&self, lane: usize, number: u64) -> usize {
-        (number % self.depth as u64) as usize * self.lanes + lane
+        (number as usize & (self.depth - 1)) + lane * self.depth
     }
 
     /// Begins the line of a lane with `row`, which has arrived.
     pub fn begin(&mut self, lane: usize, row: &[T]) {
         (self.sent[lane], self.arrived[lane]) = (0, 0);
-        self.due[lane] = 0;
-        self.rows[lane * self.size..][..self.size].copy_from_slice(row);
+        let place = self.place(lane, 0);
+        self.due[place] = 0;
+        self.rows[place * self.size..][..self.size].copy_from_slice(row);
     }
 
     /// How many messages `lane` has sent since the one it began with.
@@ -71,21 +73,9 @@ impl<T: Copy + Default> DelayLine<T> {
 
     /// Makes lane `to` a copy of lane `from`: of `other`, or else of its own.
     pub fn copy_lane(&mut self, other: Option<&Self>, from: usize, to: usize) {
-        for slot in 0..self.depth {
-            let (source, target) = (slot * self.lanes + from, slot * self.lanes + to);
-            match other {
-                Some(other) => {
-                    let source = slot * other.lanes + from;
-                    self.due[target] = other.due[source];
-                    let row = &other.rows[source * self.size..][..self.size];
-                    self.rows[target * self.size..][..self.size].copy_from_slice(row);
-                }
-                None => {
-                    self.due[target] = self.due[source];
-                    self.rows.copy_within(source * self.size..(source + 1) * self.size, target * self.size);
-                }
-            }
-        }
+        // The two are of one depth: longest latencies are equal.
+        copy_row(&mut self.due, other.map(|other| other.due.as_slice()), self.depth, from, to);
+        copy_row(&mut self.rows, other.map(|other| other.rows.as_slice()), self.depth * self.size, from, to);
         [self.sent[to], self.arrived[to]] = match other {
             Some(other) => [other.sent[from], other.arrived[from]],
             None => [self.sent[from], self.arrived[from]],

@@ -1,7 +1,7 @@
 //! Observations that arrive late.
 
 use super::delay_line::{DelayLine, FixedLine};
-use super::latency::{Latency, Redraw, Steps};
+use super::latency::{Latency, Redraw, Steps, rounded_up};
 use super::layer::{Layer, copy_row, refused};
 use crate::rl::{About, Actions, EnvError, Episodes, Out, Stream, StreamName, Which};
 
@@ -64,7 +64,7 @@ impl Layer for ObservationLatency {
                 Line::Drawn { line, steps, streams, episode } => {
                     line.begin(lane, row);
                     streams[lane] = episodes.lane(lane).stream(self.name);
-                    episode[lane] = steps.draw(&mut streams[lane]).ceil() as u64;
+                    episode[lane] = rounded_up(steps.draw(&mut streams[lane]));
                 }
             }
         }
@@ -77,7 +77,7 @@ impl Layer for ObservationLatency {
                 for (lane, row) in out.observations.chunks_exact_mut(self.size.max(1)).enumerate() {
                     let now = line.sent(lane) + 1;
                     let delay = match steps.redraw {
-                        Redraw::Message => steps.draw(&mut streams[lane]).ceil() as u64,
+                        Redraw::Message => rounded_up(steps.draw(&mut streams[lane])),
                         Redraw::Episode => episode[lane],
                     };
                     line.send(lane, row, now + delay);
