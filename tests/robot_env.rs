@@ -377,6 +377,22 @@ fn a_servo_is_paid_by_the_formula_it_states() {
     }
 }
 
+/// Where inflow and outflow are the same, `(pump_gain u / lower_outflow)^2`; and no level is above the rim.
+#[test]
+fn tanks_settle_where_inflow_is_outflow_and_do_not_run_over_their_rims() {
+    let mut play = Play::new("trueup/Tanks-v0", 2, &Options::new());
+    play.reset(0, &Options::new());
+    (0..400).for_each(|_| play.step(0.6));
+    assert!((play.info("lower_level")[0] - (0.03 * 3.0 / 0.05_f64).powi(2)).abs() < 1e-3);
+    let mut full = Play::new("trueup/Tanks-v0", 2, &Options::new().with("range", 50.0));
+    full.reset(0, &Options::new());
+    (0..100).for_each(|_| full.step(1.0));
+    assert_eq!((full.info("upper_level"), full.info("lower_level")), (vec![10.0; 2], vec![10.0; 2]));
+    let crossed = Options::new().with("lowest", 3.0).with("highest", 2.0);
+    let error = make("trueup/Tanks-v0", 1, &crossed).unwrap_err().to_string();
+    assert!(error.contains("no larger than `highest`"), "{error}");
+}
+
 #[test]
 fn a_twin_of_a_joint_is_the_servo() {
     let twin = "[twin]\nmodel = \"joint\"\n[parameters]\ninertia = 0.1\nviscous_friction = 0.0\ngain = 2.0\n\

@@ -142,12 +142,24 @@ pub(super) fn make(lanes: usize, options: &Options) -> Result<Box<dyn VecEnv>, E
     let setting = Setting::of(options, &about, &model, own, crate::robot::cart_pole_assembly)?;
     #[cfg(not(feature = "io"))]
     let setting = Setting::of(options, &about, &model, own)?;
-    with(lanes, setting, options)
+    cart_pole_env(lanes, setting.assembly, setting.randomization, options)
 }
 
-/// The environment of `setting`.
-fn with(lanes: usize, setting: Setting<CartPole>, options: &Options) -> Result<Box<dyn VecEnv>, EnvError> {
+/// `trueup/CartPole-v0` of an assembly, as a diagnosis may have given it, with what is randomized of it: `lanes` lanes. Where the
+/// assembly is integrated by Euler's method at 0.02 s and has no mechanisms but a delay of the command and white noise, it is
+/// stepped by code that is written for that; whatever else there is, by its laws.
+///
+/// # Errors
+/// No lane, options there are not or that have values they cannot have, an assembly with a controller.
+pub fn cart_pole_env(
+    lanes: usize,
+    assembly: Assembly<CartPole>,
+    randomization: Option<Randomization>,
+    options: &Options,
+) -> Result<Box<dyn VecEnv>, EnvError> {
+    let setting = Setting { assembly, randomization };
     let mut about = about();
+    options.check(ID, &about.options, Occasion::Make)?;
     let task = Balance { thresholds: THRESHOLDS, sutton_barto: options.switch(&about.options, "sutton_barto_reward")? };
     about.reward_range = if task.sutton_barto { (-1.0, 0.0) } else { (1.0, 1.0) };
     let max_steps = options.number(&about.options, "max_steps")? as u32;
