@@ -3,6 +3,8 @@
 //! Beside the plain task they have parameters of their own, a delay of the command, and noise of the position's sensor, by the laws
 //! of `sim2real::mechanism`; whatever else there may be is run by [`Simulated`](super::simulated::Simulated).
 
+#![allow(clippy::needless_range_loop, reason = "one index for many rows is what becomes vector instructions")]
+
 use rand_distr::{Distribution, StandardNormal};
 
 use super::cart_pole::{START, Thresholds};
