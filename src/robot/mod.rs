@@ -1,6 +1,7 @@
 //! Robots: plants that move, and what their simulators tend to leave out.
 
 mod cart_pole;
+mod cart_pole_lane;
 pub mod env;
 mod equations;
 mod estimate;

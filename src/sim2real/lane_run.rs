@@ -220,35 +220,3 @@ where
         &self.run.commands
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::robot::{Axis, Joint, MECHANISMS, Motion, Signal};
-    use crate::sim2real::Pid;
-
-    #[test]
-    fn the_agent_is_the_controller() {
-        let joint = Joint::new(Axis::Rotary, [0.1, 0.2, 0.0, 1.0], [0.0; 4]);
-        let closed = Assembly::new(joint, MECHANISMS).controlled_by(Pid::new([]));
-        assert!(LaneRun::new(&closed, 2, &[0.0, 0.0]).is_ok(), "a controller without gains has no part in it");
-        let kp = crate::sim2real::Parameter::new("kp", "", 3.0);
-        let closed = closed.controlled_by(Pid::new([kp]));
-        assert_eq!(LaneRun::new(&closed, 2, &[0.0, 0.0]).unwrap_err(), LoopIsClosed);
-    }
-
-    #[test]
-    fn each_lane_has_its_own_command_state_and_parameters() {
-        let joint = Joint::new(Axis::Rotary, [0.1, 0.2, 0.0, 1.0], [0.0; 4]);
-        let mut run = LaneRun::new(&Assembly::new(joint, MECHANISMS), 2, &[0.0, 0.0]).unwrap();
-        run.begin(0, &[0.1, 0.0, 0.0, 1.0], Motion::default(), Seed(0));
-        run.begin(1, &[0.2, 0.0, 0.0, 1.0], Motion { position: 1.0, velocity: 0.0 }, Seed(1));
-        for k in 0..100 {
-            let time = f64::from(k) * 1e-3;
-            run.step(Ticks { step: 1e-3, times: &[time, time] }, &[Signal(1.0), Signal(-1.0)]);
-        }
-        let [first, second] = run.states() else { panic!("two lanes") };
-        assert!((first.velocity - 1.0).abs() < 1e-12 && (second.velocity + 0.5).abs() < 1e-12);
-        assert!((first.position - 0.05).abs() < 1e-12 && (second.position - 0.975).abs() < 1e-12);
-    }
-}

@@ -1,6 +1,7 @@
 //! `trueup/CartPole-v0`: a pole is kept upright on a cart that is pushed to and fro.
 
-use super::cart_pole_lanes::{CartPoleLanes, LONGEST_DELAY, Start, Wires, started};
+use super::cart_pole_lanes::{CartPoleLanes, Start, started};
+use super::cart_pole_wires::{LONGEST_DELAY, Wires};
 use super::draws::{LaneParameters, Randomization, copy_episode};
 use super::setting::{Model, Setting, twin_options};
 use super::simulated::{Simulated, Task, Timing, described, start_of};
@@ -141,12 +142,24 @@ pub(super) fn make(lanes: usize, options: &Options) -> Result<Box<dyn VecEnv>, E
     let setting = Setting::of(options, &about, &model, own, crate::robot::cart_pole_assembly)?;
     #[cfg(not(feature = "io"))]
     let setting = Setting::of(options, &about, &model, own)?;
-    with(lanes, setting, options)
+    cart_pole_env(lanes, setting.assembly, setting.randomization, options)
 }
 
-/// The environment of `setting`.
-fn with(lanes: usize, setting: Setting<CartPole>, options: &Options) -> Result<Box<dyn VecEnv>, EnvError> {
+/// `trueup/CartPole-v0` of an assembly, as a diagnosis may have given it, with what is randomized of it: `lanes` lanes. Where the
+/// assembly is integrated by Euler's method at 0.02 s and has no mechanisms but a delay of the command and white noise, it is
+/// stepped by code that is written for that; whatever else there is, by its laws.
+///
+/// # Errors
+/// No lane, options there are not or that have values they cannot have, an assembly with a controller.
+pub fn cart_pole_env(
+    lanes: usize,
+    assembly: Assembly<CartPole>,
+    randomization: Option<Randomization>,
+    options: &Options,
+) -> Result<Box<dyn VecEnv>, EnvError> {
+    let setting = Setting { assembly, randomization };
     let mut about = about();
+    options.check(ID, &about.options, Occasion::Make)?;
     let task = Balance { thresholds: THRESHOLDS, sutton_barto: options.switch(&about.options, "sutton_barto_reward")? };
     about.reward_range = if task.sutton_barto { (-1.0, 0.0) } else { (1.0, 1.0) };
     let max_steps = options.number(&about.options, "max_steps")? as u32;
@@ -270,7 +283,7 @@ impl VecEnv for Fast {
     }
 
     fn privileged(&self, parameter: usize, values: &mut [f64]) {
-        values.copy_from_slice(self.parameters.row(parameter));
+        self.parameters.tell(parameter, values);
     }
 
     fn copy_lane(&mut self, from: usize, to: usize) {
@@ -289,5 +302,87 @@ impl VecEnv for Fast {
         self.parameters.copy(Some(&other.parameters), from, to);
         copy_episode(&mut self.episodes, Some(&other.episodes), from, to);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rl::Buffers;
+    use crate::sim2real::randomize::{Distribution, Level, Randomized, Randomizer, Target};
+
+    /// With a delay, noise, and gravity and the delay drawn at random.
+    fn setting() -> Setting<CartPole> {
+        let plant = CartPole::new(NOMINAL, [0.0; 7]).integrated(Integration::Euler { step: STEP });
+        let mut assembly = Assembly::new(plant, CART_POLE_MECHANISMS);
+        for (id, value) in [("command_delay", 0.03), ("noise", 0.01)] {
+            let mechanism = CART_POLE_MECHANISMS.iter().find(|row| row.about().name == id).unwrap();
+            let mut parameters = mechanism.forms(&Default::default())[0].parameters.clone();
+            parameters[0].nominal = value;
+            assembly = assembly.with_mechanism(*mechanism, 0, parameters);
+        }
+        let drawn = |place: usize, target: Target, low: f64, high: f64| Randomized {
+            target,
+            parameter: assembly.parameters()[place].clone(),
+            distribution: Distribution::Uniform { low, high },
+            relative: false,
+            at: Redraw::Reset,
+        };
+        let randomized =
+            vec![drawn(3, Target::own("gravity"), 9.0, 11.0), drawn(7, Target::of("command_delay", "seconds"), 0.0, 0.1)];
+        let randomizer = Randomizer::new(randomized, Vec::new()).unwrap();
+        let randomization = Randomization { randomizer, places: vec![3, 7], level: Level::FULL, regime_seconds: 1.0 };
+        Setting { assembly, randomization: Some(randomization) }
+    }
+
+    /// What is written for the task alone does what the laws do.
+    #[test]
+    fn blocks_of_lanes_do_what_the_mechanisms_do() {
+        let task = Balance { thresholds: THRESHOLDS, sutton_barto: true };
+        let timing = Timing { seconds: STEP, max_steps: 500 };
+        let wires = wires(&setting()).unwrap();
+        let mut fast: Box<dyn VecEnv> = Box::new(Fast::new(13, about(), task, setting(), wires, timing));
+        let Setting { assembly, randomization } = setting();
+        let whole = Simulated::new(task, about(), &assembly, randomization, timing, (13, &[0.0; 4])).unwrap();
+        let mut whole: Box<dyn VecEnv> = Box::new(whole);
+        let (mut one, mut other) = (Buffers::new(13, 4), Buffers::new(13, 4));
+        let seeds: Vec<u64> = (0..13).collect();
+        fast.reset(Which::All, Some(&seeds), &Options::new(), &mut one.observations).unwrap();
+        whole.reset(Which::All, Some(&seeds), &Options::new(), &mut other.observations).unwrap();
+        let mut ended = 0;
+        for k in 0..400_usize {
+            let apart = one.observations.iter().zip(&other.observations).map(|(a, b)| (a - b).abs());
+            assert!(apart.fold(0.0, f32::max) < 1e-6, "step {k}");
+            let actions: Vec<i64> = (0..13).map(|lane| ((k * (lane + 3)) / 4 % 2) as i64).collect();
+            fast.step(Actions::Discrete(&actions), &mut one.out()).unwrap();
+            whole.step(Actions::Discrete(&actions), &mut other.out()).unwrap();
+            assert_eq!(
+                (&one.terminated, &one.truncated, &one.rewards),
+                (&other.terminated, &other.truncated, &other.rewards)
+            );
+            let over = one.terminated.clone();
+            if over.contains(&true) {
+                ended += over.iter().filter(|over| **over).count();
+                fast.reset(Which::Mask(&over), None, &Options::new(), &mut one.observations).unwrap();
+                whole.reset(Which::Mask(&over), None, &Options::new(), &mut other.observations).unwrap();
+            }
+        }
+        assert!(ended > 50, "{ended} episodes");
+    }
+
+    #[test]
+    fn what_blocks_cannot_do_is_left_to_the_laws() {
+        let mut within = setting();
+        let randomized = within.randomization.as_ref().unwrap().randomizer.randomized().to_vec();
+        let every = randomized.into_iter().map(|one| Randomized { at: Redraw::EverySteps(3), ..one }).collect();
+        within.randomization.as_mut().unwrap().randomizer = Randomizer::new(every, Vec::new()).unwrap();
+        assert_eq!(wires(&within), None);
+        let bias = CART_POLE_MECHANISMS.iter().find(|row| row.about().name == "bias").unwrap();
+        let parameters = bias.forms(&Default::default())[0].parameters.clone();
+        let assembly = setting().assembly.with_mechanism(*bias, 0, parameters);
+        assert_eq!(wires(&Setting { assembly, randomization: None }), None);
+        let fine = CartPole::new(NOMINAL, [0.0; 7]);
+        let assembly = Assembly::new(fine, CART_POLE_MECHANISMS);
+        assert_eq!(wires(&Setting { assembly, randomization: None }), None);
     }
 }

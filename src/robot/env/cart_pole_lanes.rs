@@ -3,9 +3,12 @@
 //! Beside the plain task they have parameters of their own, a delay of the command, and noise of the position's sensor, by the laws
 //! of `sim2real::mechanism`; whatever else there may be is run by [`Simulated`](super::simulated::Simulated).
 
+#![allow(clippy::needless_range_loop, reason = "one index for many rows is what becomes vector instructions")]
+
 use rand_distr::{Distribution, StandardNormal};
 
 use super::cart_pole::{START, Thresholds};
+use super::cart_pole_wires::{Delay, LONGEST_DELAY, Noise, Wires, plain};
 use crate::rl::Episode;
 use crate::robot::sine::sine;
 use crate::sim2real::{Counter, Seed};
@@ -14,7 +17,7 @@ use crate::sim2real::{Counter, Seed};
 pub(super) const BLOCK: usize = 8;
 
 /// One number for each lane of a block.
-type Row = [f64; BLOCK];
+pub(super) type Row = [f64; BLOCK];
 
 /// Cart position [m] and velocity [m/s], pole angle [rad] and angular velocity [rad/s].
 #[derive(Debug, Clone, Copy, Default)]
@@ -81,28 +84,6 @@ impl Constants {
     }
 }
 
-/// A delay of each lane's command. A push has one of two directions, so that a bit a step tells all there was.
-#[derive(Debug, Clone)]
-struct Delay {
-    /// The actions of each lane, the last in the lowest bit.
-    past: Vec<u64>,
-    /// Whole steps of the delay.
-    steps: Vec<u32>,
-    /// The rest of it, as a part of a step.
-    rest: Vec<f64>,
-}
-
-/// Longest delay, in steps: one bit more is needed for the part of a step.
-pub(super) const LONGEST_DELAY: f64 = 62.0;
-
-/// Noise of each lane's position.
-#[derive(Debug, Clone)]
-struct Noise {
-    std: Vec<f64>,
-    draws: Vec<Counter>,
-    key: u64,
-}
-
 /// What lanes begin with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Start {
@@ -116,15 +97,6 @@ pub(super) struct Start {
 pub(super) fn started(episode: Episode, start: Start) -> [f64; 4] {
     let mut draws = episode.stream(START);
     std::array::from_fn(|_| draws.between(start.low, start.high))
-}
-
-/// Where, of all parameters of an assembly, those of the mechanisms are that are run here.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Wires {
-    /// The command delay's.
-    pub delay: Option<usize>,
-    /// The noise's.
-    pub noise: Option<usize>,
 }
 
 /// Cart-poles by Euler's method, `count` of them.
@@ -283,48 +255,6 @@ impl Constants {
             (&mut self.gain, &other.gain),
         ];
         rows.into_iter().for_each(|(own, other)| own[to] = other[from]);
-    }
-}
-
-/// The command of an action: -1 for 0, 1 for 1.
-#[inline(always)]
-fn signed(bit: u64) -> f64 {
-    f64::from_bits(1.0_f64.to_bits() | ((bit & 1) ^ 1) << 63)
-}
-
-#[inline(always)]
-fn plain(actions: &[i64; BLOCK]) -> Row {
-    std::array::from_fn(|k| signed(actions[k] as u64))
-}
-
-impl Delay {
-    /// What arrives of a block's actions: the mean over the step of the command `steps + rest` steps ago. Before its first step a
-    /// lane has had its first command for ever.
-    #[inline(always)]
-    fn pass(&mut self, block: usize, actions: &[i64; BLOCK], done: &[u32]) -> Row {
-        let own = block * BLOCK..(block + 1) * BLOCK;
-        let lanes = self.past[own.clone()].iter_mut().zip(&self.steps[own.clone()]).zip(&self.rest[own]);
-        let mut command = [0.0; BLOCK];
-        for (k, ((past, steps), rest)) in lanes.enumerate() {
-            let action = actions[k] as u64 & 1;
-            let first = if done[k] == 0 { action.wrapping_neg() } else { *past << 1 | action };
-            *past = first;
-            let late = first >> steps;
-            command[k] = (1.0 - rest) * signed(late) + rest * signed(late >> 1);
-        }
-        command
-    }
-}
-
-impl Noise {
-    #[inline(always)]
-    fn add(&mut self, block: usize, seen: &mut [f64]) {
-        let own = block * BLOCK..block * BLOCK + seen.len();
-        let lanes = seen.iter_mut().zip(&self.std[own.clone()]).zip(&mut self.draws[own]);
-        for ((seen, std), draws) in lanes {
-            let draw: f64 = StandardNormal.sample(draws);
-            *seen += std * draw;
-        }
     }
 }
 

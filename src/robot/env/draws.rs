@@ -33,11 +33,14 @@ struct Group {
 #[derive(Debug, Clone)]
 pub(super) struct LaneParameters {
     nominal: Vec<f64>,
-    lanes: usize,
+    /// How many parameters are drawn.
+    rows: usize,
+    /// Whether any is drawn but once in a lane's life.
+    startup: bool,
     randomization: Option<Randomization>,
     scratch: Option<DrawTable>,
     groups: Vec<Group>,
-    /// Values drawn, shape (rows, lanes).
+    /// Values drawn, shape (lanes, rows): a lane that begins writes them next to each other.
     values: Vec<f64>,
     keys: Vec<Option<(u64, DrawKey)>>,
     levels: Vec<Level>,
@@ -66,6 +69,8 @@ impl LaneParameters {
         let scratch = randomization.as_ref().map(|r| r.randomizer.nominal(1));
         let groups = randomization.as_ref().map_or_else(Vec::new, |r| groups(&r.randomizer, lanes));
         let rows = randomization.as_ref().map_or(0, |r| r.places.len());
+        let mut randomized = randomization.iter().flat_map(|r| r.randomizer.randomized());
+        let startup = randomized.any(|one| one.at == Redraw::Startup);
         let regime = |group: &Group| if let Redraw::Regime(k) = group.at { k + 1 } else { 0 };
         let count = groups.iter().map(regime).max().unwrap_or(0);
         let kept = if count > 0 { lanes } else { 0 };
@@ -79,7 +84,8 @@ impl LaneParameters {
         Self {
             whole: nominal.clone(),
             nominal,
-            lanes,
+            rows,
+            startup,
             randomization,
             scratch,
             groups,
@@ -116,9 +122,10 @@ impl LaneParameters {
         self.regimes.now.get(lane).copied().flatten().map_or(-1.0, |k| k as f64)
     }
 
-    /// What was drawn of row `row`, one a lane.
-    pub(super) fn row(&self, row: usize) -> &[f64] {
-        &self.values[row * self.lanes..][..self.lanes]
+    /// Writes what was drawn of row `row`, one a lane.
+    pub(super) fn tell(&self, row: usize, values: &mut [f64]) {
+        let lanes = self.values.chunks_exact(self.rows.max(1));
+        values.iter_mut().zip(lanes).for_each(|(value, lane)| *value = lane[row]);
     }
 
     /// Draws for lane `lane`, which begins `episode`, and gives all its parameters. `level` is a part of the declared one.
@@ -132,10 +139,12 @@ impl LaneParameters {
         let level = Level::new(own.level.get() * level).unwrap_or(own.level);
         self.levels[lane] = level;
         let turn = Turn { environment: 0, episode: episode.number };
-        own.randomizer.redraw_by(scratch, 0, key, Occasion::Startup, Turn { episode: 0, ..turn }, level);
+        if self.startup {
+            own.randomizer.redraw_by(scratch, 0, key, Occasion::Startup, Turn { episode: 0, ..turn }, level);
+        }
         own.randomizer.redraw_by(scratch, 0, key, Occasion::Reset, turn, level);
         for (row, value) in scratch.environment(0).enumerate() {
-            self.values[row * self.lanes + lane] = value;
+            self.values[lane * self.rows + row] = value;
         }
         self.groups.iter_mut().for_each(|group| group.drawn[lane] = 0);
         if self.regimes.count > 0 {
@@ -150,7 +159,7 @@ impl LaneParameters {
     fn whole(&mut self, lane: usize) -> &[f64] {
         if let Some(own) = &self.randomization {
             for (row, place) in own.places.iter().enumerate() {
-                self.whole[*place] = self.values[row * self.lanes + lane];
+                self.whole[*place] = self.values[lane * self.rows + row];
             }
         }
         &self.whole
@@ -180,7 +189,7 @@ impl LaneParameters {
             let turn = Turn { environment: 0, episode: episode.number };
             group.randomizer.redraw_by(&mut group.scratch, 0, key, occasion, turn, self.levels[lane]);
             for (row, value) in group.rows.iter().zip(group.scratch.environment(0)) {
-                self.values[row * self.lanes + lane] = value;
+                self.values[lane * self.rows + row] = value;
             }
             changed = true;
         }
@@ -189,12 +198,10 @@ impl LaneParameters {
 
     /// Makes lane `to` a copy of lane `from` of `other`, or of its own where there is none.
     pub(super) fn copy(&mut self, other: Option<&Self>, from: usize, to: usize) {
-        let lanes = self.lanes;
-        for row in 0..self.values.len() / lanes.max(1) {
-            self.values[row * lanes + to] = match other {
-                Some(other) => other.values[row * other.lanes + from],
-                None => self.values[row * lanes + from],
-            };
+        let rows = self.rows;
+        match other {
+            Some(other) => self.values[to * rows..][..rows].copy_from_slice(&other.values[from * rows..][..rows]),
+            None => self.values.copy_within(from * rows..(from + 1) * rows, to * rows),
         }
         self.keys[to] = other.map_or(self.keys[from], |other| other.keys[from]);
         self.levels[to] = other.map_or(self.levels[from], |other| other.levels[from]);

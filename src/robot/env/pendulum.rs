@@ -1,6 +1,6 @@
 //! `trueup/Pendulum-v0`: a rod on a hinge is swung up and kept upright.
 
-use super::draws::copy_episode;
+use super::draws::{Randomization, copy_episode};
 use super::pendulum_lanes::{PendulumLanes, Rates, observed, reward};
 use super::setting::{Model, Setting, twin_options};
 use super::simulated::{Simulated, Task, Timing, start_of};
@@ -9,7 +9,7 @@ use crate::rl::{
     Space, StreamName, VecEnv, Which, alike,
 };
 use crate::robot::{Motion, PENDULUM_MECHANISMS, Pendulum, Posture};
-use crate::sim2real::{Assembly, Observation};
+use crate::sim2real::{Assembly, Observation, Simulator};
 
 pub(super) const ID: &str = "trueup/Pendulum-v0";
 pub(super) const TITLE: &str = "swing a rod up and keep it upright by a torque that is too weak to lift it";
@@ -90,14 +90,9 @@ fn about() -> About {
 /// # Errors
 /// Options there are not or that have values they cannot have.
 pub(super) fn make(lanes: usize, options: &Options) -> Result<Box<dyn VecEnv>, EnvError> {
-    let mut about = about();
+    let about = about();
     options.check(ID, &about.options, Occasion::Make)?;
-    if lanes == 0 {
-        return Err(EnvError::NoLanes);
-    }
     let gravity = options.number(&about.options, "g")?;
-    let max_steps = options.number(&about.options, "max_steps")? as u32;
-    let timing = Timing { seconds: STEP, max_steps };
     let plant = Pendulum::new([1.0, 1.0, gravity, 0.0, 1.0], [0.0; 5], STEP, TOP_SPEED);
     let own = (Assembly::new(plant.clone(), PENDULUM_MECHANISMS), plant);
     let model = Model { name: "pendulum", channels: "command = { column = \"u\" }\nangle = { column = \"q\" }" };
@@ -109,10 +104,35 @@ pub(super) fn make(lanes: usize, options: &Options) -> Result<Box<dyn VecEnv>, E
     })?;
     #[cfg(not(feature = "io"))]
     let setting = Setting::of(options, &about, &model, own)?;
-    let Setting { assembly, randomization } = setting;
-    if randomization.is_none() && assembly.mechanisms().next().is_none() {
+    pendulum_env(lanes, setting.assembly, setting.randomization, options)
+}
+
+/// `trueup/Pendulum-v0` of an assembly, with what is randomized of it: `lanes` lanes. Without either, and with the step and the top
+/// speed of Gymnasium, it is stepped by code that is written for that.
+///
+/// # Errors
+/// No lane, options there are not or that have values they cannot have, an assembly with a controller.
+pub fn pendulum_env(
+    lanes: usize,
+    assembly: Assembly<Pendulum>,
+    randomization: Option<Randomization>,
+    options: &Options,
+) -> Result<Box<dyn VecEnv>, EnvError> {
+    let mut about = about();
+    options.check(ID, &about.options, Occasion::Make)?;
+    if lanes == 0 {
+        return Err(EnvError::NoLanes);
+    }
+    let max_steps = options.number(&about.options, "max_steps")? as u32;
+    let timing = Timing { seconds: STEP, max_steps };
+    let values: Vec<f64> = assembly.parameters().iter().map(|p| p.nominal).collect();
+    let gymnasiums = Pendulum::new(std::array::from_fn(|k| values[k]), [0.0; 5], STEP, TOP_SPEED);
+    let plain = *assembly.plant() == gymnasiums && values[3] == 0.0 && values[4] == 1.0;
+    if plain && randomization.is_none() && assembly.mechanisms().next().is_none() {
         (about.seconds_a_step, about.max_steps) = (Some(STEP), Some(max_steps));
-        let rates = Rates { gravity: 1.5 * gravity, torque: 3.0, step: STEP, top_speed: TOP_SPEED };
+        let [mass, length, gravity] = [values[0], values[1], values[2]];
+        let torque = 3.0 / (mass * length * length);
+        let rates = Rates { gravity: 1.5 * gravity / length, torque, step: STEP, top_speed: TOP_SPEED };
         return Ok(Box::new(Fast { about, lanes: PendulumLanes::new(lanes, rates), episodes: Episodes::new(lanes) }));
     }
     // A sensor may report what the state cannot be.

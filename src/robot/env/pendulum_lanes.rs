@@ -1,5 +1,7 @@
 //! Many pendulums side by side, in blocks that compilers turn into vector instructions.
 
+#![allow(clippy::needless_range_loop, reason = "one index for many rows is what becomes vector instructions")]
+
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::robot::sine::sines;

@@ -1,5 +1,6 @@
 //! `trueup/Servo-v0`: a servo follows a set point.
 
+use super::draws::Randomization;
 use super::set_point::{COURSES, Course, SetPoint};
 use super::setting::{Model, Setting, twin_options};
 use super::simulated::{Simulated, Task, Timing};
@@ -190,7 +191,6 @@ pub(super) fn make(lanes: usize, options: &Options) -> Result<Box<dyn VecEnv>, E
     let general = about(["rad", "rad/s"], false);
     let known = &general.options;
     options.check(ID, known, Occasion::Make)?;
-    let number = |name: &str| options.number(known, name);
     let plant = Joint::new(Axis::Rotary, NOMINAL, [0.0; 4]);
     let own = (own(&plant, options.switch(known, "mechanisms")?), plant);
     let model =
@@ -199,7 +199,26 @@ pub(super) fn make(lanes: usize, options: &Options) -> Result<Box<dyn VecEnv>, E
     let setting = Setting::of(options, &general, &model, own, crate::robot::joint_assembly)?;
     #[cfg(not(feature = "io"))]
     let setting = Setting::of(options, &general, &model, own)?;
-    let Setting { assembly, randomization } = setting;
+    servo_env(lanes, setting.assembly, setting.randomization, options)
+}
+
+/// `trueup/Servo-v0` of a joint, as a diagnosis may have given it, with what is randomized of it: `lanes` lanes.
+///
+/// The reward of a step is `-(e^2 + effort_weight u^2 + change_weight d^2)`, with the error `e` of the true position at its end, the
+/// action `u` and its change `d`, all in their units.
+///
+/// # Errors
+/// No lane, options there are not or that have values they cannot have, an assembly with a controller.
+pub fn servo_env(
+    lanes: usize,
+    assembly: Assembly<Joint>,
+    randomization: Option<Randomization>,
+    options: &Options,
+) -> Result<Box<dyn VecEnv>, EnvError> {
+    let general = about(["rad", "rad/s"], false);
+    let known = &general.options;
+    options.check(ID, known, Occasion::Make)?;
+    let number = |name: &str| options.number(known, name);
     let heat = options.switch(known, "sense_heat")?;
     if heat && !assembly.mechanisms().any(|(mechanism, ..)| mechanism.about().name == "thermal_derating") {
         return Err(EnvError::Option {
