@@ -262,7 +262,7 @@ fn with_another_future(backtest: &Backtest, cut: Timestamp) -> Backtest {
             };
             quotes.push(quote.time, &[moved(&quote.bids[0])], &[moved(&quote.asks[0])]);
         }
-        let depth: Vec<_> = history.depth().iter().copied().map(|mut change| {
+        let depth = history.depth().iter().copied().map(|mut change| {
             if change.known_at > cut {
                 change.size *= 5.0;
             }
