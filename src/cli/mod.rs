@@ -12,6 +12,7 @@ mod data;
 mod demo;
 mod diagnose;
 mod draws;
+mod env;
 mod figures;
 mod fitted;
 mod log_arguments;
@@ -72,6 +73,7 @@ enum Command {
     Mechanisms(mechanisms::Mechanisms),
     Prove(prove::Prove),
     Data(data::Data),
+    Env(env::Env),
 }
 
 /// Runs the command line of this process.
@@ -119,6 +121,7 @@ impl Command {
             Self::Mechanisms(command) => command.run(screen),
             Self::Prove(command) => command.run(screen),
             Self::Data(command) => command.run(screen),
+            Self::Env(command) => command.run(screen),
         }
     }
 }

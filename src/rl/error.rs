@@ -90,6 +90,16 @@ pub enum EnvError {
         /// Number of lanes.
         lanes: usize,
     },
+    /// There is no such channel of info.
+    #[error(
+        "there is no info channel {channel}: the environment has {channels}\nhint: channels are numbered from 0, in the order in which the environment lists them"
+    )]
+    Channel {
+        /// What was asked for.
+        channel: usize,
+        /// Number of channels.
+        channels: usize,
+    },
     /// An environment without a lane.
     #[error("an environment of 0 lanes has nothing to do\nhint: ask for at least one")]
     NoLanes,

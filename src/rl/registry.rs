@@ -2,6 +2,9 @@
 
 use super::{About, EnvError, Options, VecEnv};
 
+/// An environment that was made, or why it could not be.
+pub type Made = Result<Box<dyn VecEnv>, EnvError>;
+
 /// An environment that can be made by its id: a row of a domain's slice `ENVIRONMENTS`.
 #[derive(Debug, Clone, Copy)]
 pub struct EnvEntry {
@@ -10,7 +13,7 @@ pub struct EnvEntry {
     /// What has to be done in it, in one line.
     pub about: &'static str,
     /// Makes one of so many lanes with these options, those of [`Occasion::Make`](super::Occasion::Make).
-    pub make: fn(lanes: usize, options: &Options) -> Result<Box<dyn VecEnv>, EnvError>,
+    pub make: fn(lanes: usize, options: &Options) -> Made,
 }
 
 /// Environments by their ids.

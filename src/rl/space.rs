@@ -1,5 +1,7 @@
 //! Spaces: which observations and actions there are.
 
+use std::cmp::Ordering;
+
 /// An array of real numbers, each within bounds of its own: a `Box` of Gymnasium, in single precision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoxSpace {
@@ -70,8 +72,8 @@ impl BoxSpace {
         if inside {
             return None;
         }
-        let bad = |k: usize| !(rows[k] >= self.low[k % self.size()] && rows[k] <= self.high[k % self.size()]);
-        (0..rows.len()).find(|k| bad(*k)).map(|k| (k / self.size(), k % self.size()))
+        let within = |k: &usize| (self.low[k % self.size()]..=self.high[k % self.size()]).contains(&rows[*k]);
+        (0..rows.len()).find(|k| !within(k)).map(|k| (k / self.size(), k % self.size()))
     }
 
     /// Whether the bounds are in order, and as many as names, units and the shape say; if not, what is wrong.
@@ -89,7 +91,7 @@ impl BoxSpace {
         }
         for k in 0..size {
             // Neither bound may be NaN.
-            if !(self.low[k] <= self.high[k]) {
+            if self.low[k].partial_cmp(&self.high[k]).is_none_or(Ordering::is_gt) {
                 return Err(format!("`{}` has bounds [{}, {}]", self.names[k], self.low[k], self.high[k]));
             }
             if self.names[k].is_empty() || self.names[..k].contains(&self.names[k]) {

@@ -1,6 +1,6 @@
 //! Lanes split over threads: the same bits, sooner.
 
-use super::{About, Actions, EnvError, Options, Out, VecEnv, Which, alike};
+use super::{About, Actions, EnvError, Made, Options, Out, VecEnv, Which, alike};
 
 /// Chunks of lanes, stepped side by side on the threads of rayon's current pool.
 ///
@@ -26,11 +26,7 @@ impl Threads {
     ///
     /// # Errors
     /// [`EnvError::NoLanes`] if there is no lane or no chunk; what `make` gives.
-    pub fn new(
-        lanes: usize,
-        chunks: usize,
-        make: impl Fn(usize) -> Result<Box<dyn VecEnv>, EnvError>,
-    ) -> Result<Self, EnvError> {
+    pub fn new(lanes: usize, chunks: usize, make: impl Fn(usize) -> Made) -> Result<Self, EnvError> {
         let count = chunks.min(lanes);
         if count == 0 {
             return Err(EnvError::NoLanes);
@@ -151,4 +147,73 @@ fn step_all(
     let (before, after) = out.split(left.iter().map(|chunk| chunk.lanes).sum(), size);
     let done = rayon::join(|| step_all(left, before, size, step), || step_all(right, after, size, step));
     done.0.and(done.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rl::walk::{Push, Walk};
+    use crate::rl::{Buffers, TimeLimit, Wrap};
+
+    fn threads(lanes: usize, chunks: usize) -> Threads {
+        Threads::new(lanes, chunks, |lanes| Ok(Box::new(Walk::new(lanes).with(TimeLimit::new(20))?))).unwrap()
+    }
+
+    /// All that comes of 50 steps with some resets and a copy.
+    fn run(mut env: impl VecEnv) -> Vec<Buffers> {
+        let lanes = env.lanes();
+        let mut buffers = Buffers::of(&env);
+        let seeds: Vec<u64> = (0..lanes as u64).map(|lane| 7 * lane).collect();
+        env.reset(Which::All, Some(&seeds), &Options::new(), &mut buffers.observations).unwrap();
+        let mut all = vec![buffers.clone()];
+        for step in 0..50 {
+            let actions: Vec<f32> = (0..lanes).map(|lane| ((lane * 3 + step) as f32).sin()).collect();
+            env.step(Actions::Continuous(&actions), &mut buffers.out()).unwrap();
+            all.push(buffers.clone());
+            let mask: Vec<bool> = (0..lanes).map(|lane| (lane + step) % 7 == 0).collect();
+            env.reset(Which::Mask(&mask), None, &Options::new(), &mut buffers.observations).unwrap();
+            env.copy_lane(step % lanes, (step * 5 + 3) % lanes);
+            let [mut acted, mut seeds] = [vec![0.0; lanes], vec![0.0; lanes]];
+            env.info(0, &mut acted);
+            env.privileged(0, &mut seeds);
+            buffers.rewards.iter_mut().zip(acted).zip(seeds).for_each(|((r, a), s)| *r += a + s);
+            all.push(buffers.clone());
+        }
+        all
+    }
+
+    #[test]
+    fn any_number_of_chunks_gives_the_same_bits() {
+        let alone = run(Walk::new(13).with(TimeLimit::new(20)).unwrap());
+        for chunks in [1, 2, 3, 13, 99] {
+            assert_eq!(run(threads(13, chunks)), alone, "{chunks} chunks");
+        }
+    }
+
+    #[test]
+    fn a_failure_names_the_lane_among_all() {
+        let mut env = Threads::new(5, 2, |lanes| {
+            let mut push = Push::new(lanes);
+            push.lane_mut(lanes - 1).fails = Some(0);
+            Ok(Box::new(push))
+        })
+        .unwrap();
+        let mut buffers = Buffers::of(&env);
+        env.reset(Which::All, Some(&[0; 5]), &Options::new(), &mut buffers.observations).unwrap();
+        let error = env.step(Actions::Discrete(&[1; 5]), &mut buffers.out()).unwrap_err();
+        assert!(matches!(error, EnvError::Failed { lane: 1, .. }), "{error}");
+        assert!(matches!(Threads::new(0, 2, |lanes| Ok(Box::new(Walk::new(lanes)))), Err(EnvError::NoLanes)));
+    }
+
+    #[test]
+    fn a_lane_is_copied_between_vectors_made_alike_and_no_others() {
+        let (mut one, other) = (threads(4, 2), threads(6, 3));
+        one.copy_lane_from(&other, 5, 0).unwrap();
+        let error = one.copy_lane_from(&Walk::new(4), 0, 0).unwrap_err().to_string();
+        assert!(error.contains("`test/Walk-v0`") && error.contains("hint:"), "{error}");
+        assert!(Walk::new(2).copy_lane_from(&Push::new(2), 0, 0).is_err());
+        let boxed: Box<dyn VecEnv> = Box::new(Walk::new(2));
+        Walk::new(2).copy_lane_from(&boxed, 1, 0).unwrap();
+        assert!(boxed.clone().copy_lane_from(&Walk::new(3), 2, 0).is_ok());
+    }
 }
