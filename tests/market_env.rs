@@ -15,7 +15,7 @@ use trueup::market::{
     Backtest, Cash, Halt, History, Latencies, Latency, Matching, Orders, Quotes, Record, Role, Session, Settings, Side,
     Strategy, View, WhileHalted,
 };
-use trueup::rl::{Actions, Buffers, Each, Env, EnvError, Episode, Options, Step, Threads, VecEnv, Which};
+use trueup::rl::{Actions, Buffers, Each, Env, EnvError, Episode, Options, Step, Threads, VecEnv, Which, check_env};
 use trueup::sim2real::randomize::{Distribution, Level, Randomized, Randomizer, Redraw, Target};
 use trueup::sim2real::{Parameter, Seed, Timestamp};
 
@@ -398,6 +398,18 @@ fn every_environment_stays_within_its_spaces_on_any_data() {
                 }
                 assert_eq!(ended, 4, "{} on {data} by {pace}", entry.id);
             }
+        }
+    }
+}
+
+#[test]
+fn every_environment_keeps_the_contract() {
+    for entry in ENVIRONMENTS {
+        for data in ["bars", "quotes", "book"] {
+            let options = Options::new().with("rows", 1_200.0).with("length", 25.0).with("data", data);
+            let options = options.with("latency", 0.1).with("randomization", 0.5);
+            let report = check_env(|lanes| (entry.make)(lanes, &options), 80).unwrap();
+            assert!(report.passed() && report.episodes > 0, "{data}: {report}");
         }
     }
 }
