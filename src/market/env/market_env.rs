@@ -273,10 +273,10 @@ impl Course {
             }
         }
         let over = ended || self.session.is_over();
-        let view = self.session.seen(self.event).map_err(|error| BacktestError::Money {
-            place: format!("the account at {}", self.event.time),
-            error,
-        })?;
+        let view = self
+            .session
+            .seen(self.event)
+            .map_err(|error| BacktestError::Money { place: format!("the account at {}", self.event.time), error })?;
         let blotter = self.session.blotter();
         let task = &mut driver.task;
         let Outcome { reward, done } = if over { task.cut_off(&view, blotter) } else { task.settle(&view, blotter) };

@@ -50,7 +50,12 @@ impl Session {
     ///
     /// # Errors
     /// If what is held, which is nothing, cannot be valued.
-    pub(in crate::market) fn begin_with_book(&mut self, instrument: usize, book: DepthBook, others: Others) -> Result<(), MoneyError> {
+    pub(in crate::market) fn begin_with_book(
+        &mut self,
+        instrument: usize,
+        book: DepthBook,
+        others: Others,
+    ) -> Result<(), MoneyError> {
         let (bid, ask) = (book.best(Side::Buy), book.best(Side::Sell));
         self.venue.floors[instrument].begin_with_book(book.clone(), others.clone());
         let known = &mut self.known[instrument];
