@@ -214,7 +214,10 @@ impl<T: Task> Env for MarketEnv<T> {
         // As it was, should the next episode not begin.
         let before = self.driver.clone();
         match self.begun(episode, start, observation) {
-            Ok(course) => {
+            Ok(mut course) => {
+                if let Some(over) = &mut self.course {
+                    course.session.reuse(&mut over.session);
+                }
                 self.course = Some(course);
                 Ok(())
             }
