@@ -2,121 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+mod env_scene;
 mod market_scene;
 
-use std::sync::Arc;
-
-use market_scene::{bars, instrument, venue};
+use env_scene::{Numbers, ROWS, at_random, bits, env, market, played, portfolio, run_for};
 use trueup::market::env::{
-    DataKind, DrawnExecution, ENVIRONMENTS, Ended, Execute, Generated, MakeMarket, MarketEnv, MarketEnvError, MarketSetup,
-    Pace, Payoff, Portfolio, Reward, Task, Ways, make_on,
+    DataKind, ENVIRONMENTS, Ended, Execute, MakeMarket, MarketEnv, MarketSetup, Pace, Portfolio, Task, Ways,
 };
-use trueup::market::{
-    Backtest, Cash, Halt, History, Latencies, Latency, Matching, Orders, Quotes, Record, Role, Session, Settings, Side,
-    Strategy, View, WhileHalted,
-};
-use trueup::rl::{Actions, Buffers, Each, Env, EnvError, Episode, Options, Step, Threads, VecEnv, Which};
-use trueup::sim2real::randomize::{Distribution, Level, Randomized, Randomizer, Redraw, Target};
-use trueup::sim2real::{Parameter, Seed, Timestamp};
-
-const ROWS: usize = 3_000;
-
-fn generated(kind: DataKind, instruments: usize, rows: usize) -> Generated {
-    Generated { kind, rows, instruments, momentum: 0.0, seed: Seed(3) }
-}
-
-/// A market whose messages take random times and whose fills cost random amounts, where it is to be `rough`.
-fn market(kind: DataKind, instruments: usize, rows: usize, rough: bool) -> Backtest {
-    let data = generated(kind, instruments, rows);
-    let mut all = data.instruments();
-    let mut parts: Vec<(&str, &str, f64)> = Vec::new();
-    let mut settings = Settings { max_leverage: 1.0, ..Settings::with_cash(Cash::nearest(1e6).unwrap()) };
-    if rough {
-        parts = vec![("adverse_selection", "", 1.0), ("transient_impact", "exponential", 9.0), ("commission", "bps", 0.7)];
-        let order = Latency::Exponential { least: 0.05, mean: 0.4 };
-        let feed = Latency::Uniform { least: 0.0, most: 0.3 };
-        settings.latencies = Latencies { feed, response: order.clone(), order, ..Latencies::default() };
-        for one in &mut all {
-            (one.average_daily_volume, one.daily_volatility) = (Some(1e6), Some(0.02));
-        }
-    }
-    Backtest::new(all, data.histories().unwrap(), venue(&parts), settings).unwrap()
-}
-
-fn portfolio(instruments: usize) -> Portfolio {
-    Portfolio::new((0..instruments).map(|k| format!("GEN{k}")).collect(), Reward::default())
-}
-
-fn env<T: Task>(setup: MarketSetup, task: T) -> MarketEnv<T> {
-    let count = setup.backtest.instruments().len();
-    MarketEnv::new("trueup/Test-v0", "test", setup, task, count).unwrap()
-}
-
-/// Numbers within [0, 1) that are the same every time.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1_u64 << 24) as f32
-    }
-
-    fn action<E: Env>(&mut self, env: &E) -> Vec<f32> {
-        let space = env.about().action.as_box().unwrap();
-        space.low.iter().zip(&space.high).map(|(low, high)| low + (high - low) * self.next()).collect()
-    }
-}
-
-/// What an episode gave.
-#[derive(Debug, Clone, PartialEq, Default)]
-struct Told {
-    /// Bits of all observations, the first among them.
-    observations: Vec<Vec<u32>>,
-    actions: Vec<Vec<f32>>,
-    rewards: Vec<f64>,
-    last: Option<(bool, bool)>,
-}
-
-fn bits(observation: &[f32]) -> Vec<u32> {
-    observation.iter().map(|value| value.to_bits()).collect()
-}
-
-/// Steps `env` by `policy` to the end of an episode, or for so many steps.
-fn played<E: Env>(
-    env: &mut E,
-    episode: Episode,
-    most: usize,
-    mut policy: impl FnMut(&E, &[f32]) -> Vec<f32>,
-) -> Told {
-    let mut observation = vec![0.0; env.about().observation.size()];
-    env.reset(episode, &Options::new(), &mut observation).unwrap();
-    let mut told = Told { observations: vec![bits(&observation)], ..Told::default() };
-    for _ in 0..most {
-        let action = policy(env, &observation);
-        let step = env.step(Actions::Continuous(&action), &mut observation).unwrap();
-        assert_eq!(env.about().observation.outside(&observation), None, "step {}", told.rewards.len());
-        assert!(step.reward.is_finite());
-        told.observations.push(bits(&observation));
-        told.actions.push(action);
-        told.rewards.push(step.reward);
-        if step.terminated || step.truncated {
-            told.last = Some((step.terminated, step.truncated));
-            break;
-        }
-    }
-    told
-}
-
-fn at_random<E: Env>(seed: u64) -> impl FnMut(&E, &[f32]) -> Vec<f32> {
-    let mut numbers = Numbers(seed);
-    move |env, _| numbers.action(env)
-}
-
-/// Runs `session` with `strategy` until so many events were seen.
-fn run_for(mut session: Session, strategy: &mut dyn Strategy, events: usize) -> Record {
-    while session.events() < events && session.step(strategy).unwrap().is_some() {}
-    session.finish().unwrap()
-}
+use trueup::market::{Backtest, History, Orders, Quotes, Record, Settings, Strategy, View};
+use trueup::rl::{Actions, Buffers, Env, Episode, Options, Step, Threads, VecEnv, Which, check_env};
+use trueup::sim2real::Timestamp;
 
 /// Plays an episode at random, and the same actions as a strategy in the backtest that the episode is: the records must be the
 /// same, and the policy must have seen the same.
@@ -143,7 +38,8 @@ fn same_as_in_a_backtest<T: Task>(mut env: MarketEnv<T>, seed: u64, most: usize,
 #[test]
 fn an_episode_is_the_backtest_of_what_is_done_in_it_to_the_last_bit() {
     let mut fills = 0;
-    for (kind, rough) in [DataKind::Bars, DataKind::Quotes, DataKind::Book].into_iter().flat_map(|k| [(k, false), (k, true)]) {
+    for (kind, rough) in [DataKind::Bars, DataKind::Quotes, DataKind::Book].into_iter().flat_map(|k| [(k, false), (k, true)])
+    {
         for length in [None, Some(200)] {
             let setup = || MarketSetup { length, ..MarketSetup::new(market(kind, 1, ROWS, rough)) };
             let what = |task: &str| format!("{task} on {kind:?}, rough: {rough}, length {length:?}");
@@ -262,7 +158,7 @@ fn with_another_future(backtest: &Backtest, cut: Timestamp) -> Backtest {
             };
             quotes.push(quote.time, &[moved(&quote.bids[0])], &[moved(&quote.asks[0])]);
         }
-        let depth: Vec<_> = history.depth().iter().copied().map(|mut change| {
+        let depth = history.depth().iter().copied().map(|mut change| {
             if change.known_at > cut {
                 change.size *= 5.0;
             }
@@ -330,7 +226,8 @@ fn a_copy_goes_on_with_the_same_bits() {
 #[test]
 fn a_lane_does_not_depend_on_others_or_on_threads() {
     for entry in ENVIRONMENTS {
-        let options = Options::new().with("rows", 1_500.0).with("length", 40.0).with("randomization", 1.0).with("latency", 0.2);
+        let options =
+            Options::new().with("rows", 1_500.0).with("length", 40.0).with("randomization", 1.0).with("latency", 0.2);
         let make = |lanes| (entry.make)(lanes, &options).unwrap();
         let run = |env: &mut dyn VecEnv, seeds: &[u64]| {
             let (size, mut out) = (env.about().action.size(), Buffers::of(env));
@@ -403,6 +300,18 @@ fn every_environment_stays_within_its_spaces_on_any_data() {
 }
 
 #[test]
+fn every_environment_keeps_the_contract() {
+    for entry in ENVIRONMENTS {
+        for data in ["bars", "quotes", "book"] {
+            let options = Options::new().with("rows", 1_200.0).with("length", 25.0).with("data", data);
+            let options = options.with("latency", 0.1).with("randomization", 0.5);
+            let report = check_env(|lanes| (entry.make)(lanes, &options), 80).unwrap();
+            assert!(report.passed() && report.episodes > 0, "{data}: {report}");
+        }
+    }
+}
+
+#[test]
 fn an_episode_in_the_midst_is_the_backtest_of_the_rows_from_there() {
     for kind in [DataKind::Bars, DataKind::Quotes] {
         let setup = MarketSetup::new(market(kind, 1, ROWS, false)).with_length(300);
@@ -414,8 +323,7 @@ fn an_episode_in_the_midst_is_the_backtest_of_the_rows_from_there() {
         let cut: Vec<History> = backtest.histories().iter().map(|h| h.within(from, Timestamp::MAX)).collect();
         assert!(cut[0].rows() < backtest.histories()[0].rows());
         let mut actions = told.actions.into_iter();
-        let policy =
-            |_: &[f32], action: &mut [f32]| actions.next().map(|next| action.copy_from_slice(&next)).is_some();
+        let policy = |_: &[f32], action: &mut [f32]| actions.next().map(|next| action.copy_from_slice(&next)).is_some();
         let mut strategy = env.acted(policy).unwrap();
         let ran = run_for(backtest.on(cut).unwrap().start(), &mut strategy, env.events());
         let stepped = env.record().unwrap().unwrap();
@@ -468,253 +376,4 @@ fn a_book_is_there_when_an_episode_begins_in_the_midst() {
         assert_eq!(one, other, "from {start}");
     }
     assert!(rows > 0);
-}
-
-#[test]
-fn an_executed_order_costs_its_implementation_shortfall_and_is_never_exceeded() {
-    for (kind, rough) in [(DataKind::Bars, false), (DataKind::Quotes, true), (DataKind::Book, true)] {
-        let setup = MarketSetup::new(market(kind, 1, ROWS, rough)).with_length(50);
-        let mut env = env(setup, Execute::new(3_000.0, Ways::Both));
-        let mut sides = [0; 2];
-        for number in 0..20 {
-            let told = played(&mut env, Episode { seed: 6, number }, usize::MAX, at_random(number));
-            let record = env.record().unwrap().unwrap();
-            let fills = &record.blotter.fills;
-            let side = fills[0].side;
-            sides[usize::from(side == Side::Sell)] += 1;
-            assert!(fills.iter().all(|fill| fill.side == side));
-            let done: f64 = fills.iter().map(|fill| fill.quantity.to_f64()).sum();
-            let arrival = env.info(env.about().channel("arrival_price").unwrap());
-            if env.ended() == Ended::Done {
-                assert_eq!(done, 3_000.0, "{kind:?} {number}");
-                assert_eq!(told.last, Some((true, false)));
-            } else {
-                assert!(done < 3_000.0 && env.ended() == Ended::Data, "{kind:?} {number}: {:?}", env.ended());
-                continue;
-            }
-            let paid: f64 = fills
-                .iter()
-                .map(|f| side.sign() * (f.price.to_f64() - arrival) * f.quantity.to_f64() + f.fee.to_f64())
-                .sum();
-            let shortfall = 1e4 * paid / (arrival * 3_000.0);
-            let rewards: f64 = told.rewards.iter().sum();
-            assert!((rewards + shortfall).abs() < 1e-6, "{kind:?} {number}: {rewards} {shortfall}");
-        }
-        assert!(sides.iter().all(|count| *count > 2), "{sides:?}");
-    }
-}
-
-#[test]
-fn a_maker_rests_and_stays_within_its_inventory() {
-    let setup = MarketSetup::new(market(DataKind::Book, 1, 20_000, false));
-    let mut env = env(setup, MakeMarket::new(100.0, 300.0, 0.5));
-    let mut largest = 0.0_f64;
-    let cash = env.about().channel("equity").unwrap();
-    let told = played(&mut env, Episode::default(), 8_000, |env, _| {
-        let equity = env.info(cash);
-        assert!(equity > 0.0);
-        vec![0.0, 0.0, 1.0]
-    });
-    let record = env.record().unwrap().unwrap();
-    let mut held = 0.0_f64;
-    for fill in &record.blotter.fills {
-        assert_eq!(fill.why.role, Role::Maker);
-        held += fill.side.sign() * fill.quantity.to_f64();
-        largest = largest.max(held.abs());
-    }
-    assert!(record.blotter.fills.len() > 50, "{}", record.blotter.fills.len());
-    assert!(largest <= 300.0, "{largest}");
-    // What it is paid is what it gained, less what it held.
-    let equity = env.info(cash);
-    let paid: f64 = told.rewards.iter().sum();
-    assert!(paid <= (equity - 1e6) / (0.01 * 100.0) + 1e-6);
-}
-
-#[test]
-fn what_is_drawn_for_an_episode_is_what_it_runs_on() {
-    let parameter = |name: &'static str, unit| Parameter::new(name, unit, 0.5).within(0.0, 1e3);
-    let uniform = |target: Target, parameter, low, high| Randomized {
-        target,
-        parameter,
-        distribution: Distribution::Uniform { low, high },
-        relative: false,
-        at: Redraw::Reset,
-    };
-    let randomized = vec![
-        uniform(Target::of("commission", "bps"), parameter("bps", "bps"), 1.0, 9.0),
-        uniform(Target::of("latency", "order"), parameter("order", "s"), 0.1, 0.9),
-    ];
-    let execution = DrawnExecution { randomizer: Randomizer::new(randomized.clone(), vec![]).unwrap(), level: Level::FULL };
-    let setup = || {
-        let data = generated(DataKind::Quotes, 1, ROWS);
-        let settings = Settings::with_cash(Cash::nearest(1e6).unwrap());
-        let (all, histories) = (data.instruments(), data.histories().unwrap());
-        let backtest = Backtest::new(all, histories, venue(&[("commission", "bps", 0.5)]), settings).unwrap();
-        MarketSetup::new(backtest).with_length(60)
-    };
-    let mut one = env(setup().with_execution(execution.clone()), portfolio(1));
-    let mut drawn = Vec::new();
-    for number in 0..6 {
-        played(&mut one, Episode { seed: 2, number }, usize::MAX, at_random(number));
-        let values = [one.privileged(0), one.privileged(1)];
-        assert!((1.0..9.0).contains(&values[0]) && (0.1..0.9).contains(&values[1]));
-        let record = one.record().unwrap().unwrap();
-        for fill in &record.blotter.fills {
-            let bps = 1e4 * fill.fee.to_f64() / (fill.price.to_f64() * fill.quantity.to_f64());
-            assert!((bps - values[0]).abs() < 1e-6, "{bps} {values:?}");
-        }
-        for order in &record.blotter.orders {
-            let took = order.arrives_at.seconds_since(order.decided_at);
-            assert!((took - values[1]).abs() < 1e-6, "{took} {values:?}");
-        }
-        drawn.push(values);
-    }
-    assert!(drawn.windows(2).all(|w| w[0] != w[1]));
-    assert_eq!(one.about().privileged.len(), 2);
-    let mut again = env(setup().with_execution(execution), portfolio(1));
-    played(&mut again, Episode { seed: 2, number: 3 }, 1, at_random(1));
-    assert_eq!([again.privileged(0), again.privileged(1)], drawn[3]);
-    let unknown = vec![uniform(Target::of("half_spread", "bps"), parameter("bps", "bps"), 1.0, 2.0)];
-    let execution = DrawnExecution { randomizer: Randomizer::new(unknown, vec![]).unwrap(), level: Level::FULL };
-    let refused = MarketEnv::new("trueup/Test-v0", "", setup().with_execution(execution), portfolio(1), 1).unwrap_err();
-    assert!(refused.to_string().starts_with("`half_spread.bps` cannot be drawn: the venue has commission, latency\nhint: "));
-}
-
-#[test]
-fn ruin_ends_an_episode_and_a_halt_and_refusals_are_told() {
-    // It falls to a tenth within two bars.
-    let falling = bars(&[(100.0, 100.0), (100.0, 100.0), (100.0, 99.0), (50.0, 40.0), (20.0, 10.0), (10.0, 10.0)]);
-    let settings = Settings { max_leverage: 4.0, ..Settings::with_cash(Cash::nearest(1e5).unwrap()) };
-    let backtest = Backtest::new(vec![instrument("A")], vec![falling], venue(&[]), settings.clone()).unwrap();
-    let mut task = portfolio(1);
-    task.leverage = 3.0;
-    let setup = MarketSetup { warm_up: 0, ..MarketSetup::new(backtest) };
-    let mut ruined = env(setup, task);
-    let told = played(&mut ruined, Episode::default(), usize::MAX, |_, _| vec![1.0]);
-    assert_eq!((told.last, ruined.ended()), (Some((true, false)), Ended::Done));
-    assert!(ruined.info(ruined.about().channel("equity").unwrap()) <= 0.0);
-    let told_of = |env: &MarketEnv<Portfolio>, name| env.info(env.about().channel(name).unwrap());
-
-    let quiet: Vec<(f64, f64)> = vec![(100.0, 100.0); 20];
-    let minute = 60 * Timestamp::NANOS;
-    let halt = Halt { instrument: 0, from: Timestamp(5 * minute), to: Timestamp(15 * minute), reason: None };
-    let matching = Matching { halted: WhileHalted::Refuse, ..Matching::default() };
-    let halted = Settings { halts: vec![halt], matching, ..settings };
-    let backtest = Backtest::new(vec![instrument("A")], vec![bars(&quiet)], venue(&[]), halted).unwrap();
-    let setup = MarketSetup { warm_up: 0, ..MarketSetup::new(backtest) };
-    let mut task = portfolio(1);
-    // More than the account may carry: refused by the desk.
-    task.leverage = 9.0;
-    let mut env = env(setup, task);
-    let mut seen = Vec::new();
-    played(&mut env, Episode::default(), usize::MAX, |env, _| {
-        seen.push((told_of(env, "halted"), told_of(env, "refused"), told_of(env, "orders")));
-        vec![if seen.len() < 3 { 1.0 } else { 0.05 * (seen.len() % 3) as f32 }]
-    });
-    assert_eq!(seen[0], (0.0, 0.0, 0.0));
-    assert_eq!(seen[2], (0.0, 2.0, 0.0), "both were refused");
-    assert!(seen.iter().filter(|(halted, ..)| *halted == 1.0).count() >= 9);
-    let record = env.record().unwrap().unwrap();
-    let reasons: Vec<_> = record.blotter.orders.iter().filter_map(|order| order.reason).collect();
-    assert!(reasons.contains(&trueup::market::Reason::Halted), "{reasons:?}");
-}
-
-#[test]
-fn what_cannot_be_is_said_with_its_remedy() {
-    let refused = |setup: MarketSetup| {
-        MarketEnv::new("trueup/Test-v0", "", setup, portfolio(1), 1).map(|_| ()).unwrap_err().to_string()
-    };
-    let setup = |rows| MarketSetup::new(market(DataKind::Bars, 1, rows, false));
-    assert_eq!(
-        refused(setup(100).with_length(93)),
-        "episodes of 93 steps and 8 rows before them do not fit into 100 rows of data\nhint: shorten `length` or `warm_up`, or give more data"
-    );
-    assert!(refused(setup(100).with_pace(Pace::Seconds(f64::NAN))).contains("the pace in seconds is NaN"));
-    assert!(refused(setup(100).with_pace(Pace::Events(0))).contains("at least 1"));
-    assert!(refused(MarketSetup::new(market(DataKind::Bars, 2, 100, false))).contains("the backtest has 2"));
-    // A single row, and a window that just fits.
-    let mut one = env(MarketSetup { warm_up: 0, ..setup(1) }, portfolio(1));
-    let size = one.about().observation.size();
-    let told = {
-        let mut observation = vec![0.0; size];
-        one.reset(Episode::default(), &Options::new(), &mut observation).unwrap();
-        one.step(Actions::Continuous(&[1.0]), &mut observation).unwrap()
-    };
-    assert_eq!((told.reward, told.truncated, one.ended()), (0.0, true, Ended::Data));
-    let mut none = env(MarketSetup { warm_up: 1, ..setup(1) }, portfolio(1));
-    let error = none.reset(Episode::default(), &Options::new(), &mut vec![0.0; size]).unwrap_err();
-    assert!(matches!(error, EnvError::Failed { .. }) && error.to_string().contains("before the first step is due"), "{error}");
-    let mut fits = env(setup(100).with_length(91), portfolio(1));
-    played(&mut fits, Episode::default(), usize::MAX, at_random(1));
-    assert_eq!(fits.ended(), Ended::Length);
-    let mut windowed = env(setup(100).with_length(10), portfolio(1));
-    let mut start = |row: f64| {
-        windowed.reset(Episode::default(), &Options::new().with("start", row), &mut vec![0.0; size]).map_err(|e| e.to_string())
-    };
-    assert!(start(8.0).is_ok() && start(89.0).is_ok());
-    assert!(start(90.0).unwrap_err().contains("give a row from 8 to 89"));
-    assert!(start(7.0).is_err());
-    assert!(start(-2.0).unwrap_err().contains("option `start` is -2"));
-    let mut fresh = env(setup(50), portfolio(1));
-    let error = fresh.step(Actions::Continuous(&[0.0]), &mut vec![0.0; size]).unwrap_err();
-    assert!(matches!(error, EnvError::NotReset { lane: 0 }));
-    let made = |id, options| make_on(id, 1, setup(100), &options).map(|_| ()).unwrap_err().to_string();
-    assert!(made("trueup/Nothing-v0", Options::new()).contains("there are trueup/Trade-v0"));
-    assert!(made("trueup/Trade-v0", Options::new().with("lenght", 5.0)).contains("did you mean `length`"));
-    assert!(made("trueup/Trade-v0", Options::new()).contains("do not fit"));
-    assert!(matches!(
-        MarketEnv::new("x", "", MarketSetup::new(market(DataKind::Bars, 2, 100, false)), portfolio(2), 1),
-        Err(MarketEnvError::Instruments { task: 1, found: 2 })
-    ));
-}
-
-#[test]
-fn rewards_are_what_they_are_said_to_be() {
-    let run = |reward: Reward| {
-        let mut task = portfolio(1);
-        task.reward = reward;
-        let mut one = env(MarketSetup::new(market(DataKind::Bars, 1, 400, true)), task);
-        let told = played(&mut one, Episode::default(), usize::MAX, at_random(1));
-        (told.rewards, one.record().unwrap().unwrap())
-    };
-    let (profit, record) = run(Reward::default());
-    let (log, _) = run(Reward { payoff: Payoff::LogProfit, ..Reward::default() });
-    assert!(profit.iter().zip(&log).all(|(one, other)| (one.ln_1p() - other).abs() < 1e-12));
-    let (dear, same) = run(Reward { cost_penalty: 3.0, ..Reward::default() });
-    assert_eq!(record, same, "what is rewarded changes nothing of the account");
-    let taken: f64 = profit.iter().zip(&dear).map(|(one, other)| one - other).sum();
-    let fees: f64 = record.blotter.fills.iter().map(|fill| fill.fee.to_f64()).sum();
-    assert!(fees > 0.0 && (taken / (3.0 * fees / 1e6) - 1.0).abs() < 0.1, "{taken} {fees}");
-    let (deep, _) = run(Reward { drawdown_penalty: 1.0, ..Reward::default() });
-    assert!(profit.iter().zip(&deep).all(|(one, other)| other <= one) && profit != deep);
-}
-
-#[test]
-fn regimes_are_followed_as_they_come() {
-    let data = generated(DataKind::Bars, 1, 20_000);
-    let backtest = market(DataKind::Bars, 1, 20_000, false);
-    let mut one = env(MarketSetup::new(backtest), portfolio(1));
-    let turbulent = one.about().observation.component("regime_1").unwrap();
-    let mut believed = Vec::new();
-    played(&mut one, Episode::default(), usize::MAX, |_, observation| {
-        believed.push(observation[turbulent]);
-        vec![0.0]
-    });
-    // Where returns are large for long, the turbulent regime is believed in, and where they are small, the calm one.
-    let bars = data.histories().unwrap()[0].bars().to_vec();
-    let returns: Vec<f64> = bars.windows(2).map(|w| (w[1].close.to_f64() / w[0].close.to_f64()).ln().abs()).collect();
-    let (mut high, mut low) = (Vec::new(), Vec::new());
-    for k in 300..believed.len() {
-        let recent = returns[k - 20 + 8 - 1..k + 8 - 1].iter().sum::<f64>() / 20.0;
-        if recent > 1.2e-3 {
-            high.push(f64::from(believed[k]));
-        } else if recent < 5e-4 {
-            low.push(f64::from(believed[k]));
-        }
-    }
-    let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
-    assert!(high.len() > 500 && low.len() > 500);
-    assert!(mean(&high) > 0.7 && mean(&low) < 0.2, "{} {}", mean(&high), mean(&low));
-    let shared = Arc::new(one);
-    assert_eq!(Each::new((*shared).clone(), 2).unwrap().lanes(), 2);
 }

@@ -8,8 +8,8 @@ use super::known::Known;
 use super::rates::multiplied;
 use super::{
     Balance, Bar, Bracket, Calendar, Cash, Condition, CorporateAction, DepthBook, Hours, Increments, Instrument, Ledger,
-    Link, Margin, OpenOrder, OrderId, OrderKind, Position, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Terms,
-    Ticket, UnderHalt,
+    Link, Margin, OpenOrder, OrderId, OrderKind, Position, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side,
+    Terms, Ticket, UnderHalt,
 };
 
 /// What brought an event about; in the order in which they come at one instant.

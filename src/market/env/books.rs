@@ -52,8 +52,7 @@ impl Books {
         let line = Line::whole(&self.history);
         let kind = if line.tells(RowKind::Orders) { RowKind::Orders } else { RowKind::Depth };
         let end = line.first_known(kind, from);
-        let Kept { mut row, book, others } =
-            self.kept[..self.kept.partition_point(|kept| kept.row <= end)].last()?.clone();
+        let Kept { mut row, book, others } = self.kept[..self.kept.partition_point(|kept| kept.row <= end)].last()?.clone();
         let mut known = Known { book: Some(book), others, ..Known::default() };
         while row < end {
             let next = line.batch(kind, row).min(end);

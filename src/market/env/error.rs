@@ -75,13 +75,17 @@ pub enum MarketEnvError {
         hint: &'static str,
     },
     /// Something is to be drawn anew within an episode.
-    #[error("`{target}` is drawn anew within an episode\nhint: execution is drawn when an episode begins: say at = \"reset\"")]
+    #[error(
+        "`{target}` is drawn anew within an episode\nhint: execution is drawn when an episode begins: say at = \"reset\""
+    )]
     Within {
         /// What is drawn.
         target: String,
     },
     /// Something is to be drawn that the venue does not have.
-    #[error("`{target}` cannot be drawn: the venue has {known}\nhint: add the mechanism to the venue with its nominal value, or drop it here")]
+    #[error(
+        "`{target}` cannot be drawn: the venue has {known}\nhint: add the mechanism to the venue with its nominal value, or drop it here"
+    )]
     UnknownTarget {
         /// What was to be drawn.
         target: String,

@@ -53,11 +53,8 @@ impl Default for FeatureSettings {
 /// # Errors
 /// None: its numbers are a model.
 pub fn calm_and_turbulent() -> Result<HiddenMarkov, RegimeError> {
-    let state = |deviation: f64| Emission {
-        mean: vec![0.0],
-        spread: Spread::Diagonal(vec![deviation * deviation]),
-        degrees: None,
-    };
+    let state =
+        |deviation: f64| Emission { mean: vec![0.0], spread: Spread::Diagonal(vec![deviation * deviation]), degrees: None };
     HiddenMarkov::new(vec![0.75, 0.25], vec![vec![0.99, 0.01], vec![0.03, 0.97]], vec![state(0.7), state(1.8)])
 }
 

@@ -18,9 +18,7 @@ use std::collections::BTreeMap;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::market::{
-    Bar, DepthAction, DepthChange, History, HistoryError, Instrument, Level, Price, Print, Quotes, Side,
-};
+use crate::market::{Bar, DepthAction, DepthChange, History, HistoryError, Instrument, Level, Price, Print, Quotes, Side};
 use crate::sim2real::{Draws, Seed, Timestamp};
 
 /// What generated data are.

@@ -214,7 +214,10 @@ impl<T: Task> Env for MarketEnv<T> {
         // As it was, should the next episode not begin.
         let before = self.driver.clone();
         match self.begun(episode, start, observation) {
-            Ok(course) => {
+            Ok(mut course) => {
+                if let Some(over) = &mut self.course {
+                    course.session.reuse(&mut over.session);
+                }
                 self.course = Some(course);
                 Ok(())
             }
@@ -273,10 +276,10 @@ impl Course {
             }
         }
         let over = ended || self.session.is_over();
-        let view = self.session.seen(self.event).map_err(|error| BacktestError::Money {
-            place: format!("the account at {}", self.event.time),
-            error,
-        })?;
+        let view = self
+            .session
+            .seen(self.event)
+            .map_err(|error| BacktestError::Money { place: format!("the account at {}", self.event.time), error })?;
         let blotter = self.session.blotter();
         let task = &mut driver.task;
         let Outcome { reward, done } = if over { task.cut_off(&view, blotter) } else { task.settle(&view, blotter) };

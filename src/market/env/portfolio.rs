@@ -1,6 +1,6 @@
 //! Holding a portfolio: an action says which share of it each instrument is to be.
 
-use crate::market::{Blotter, Cash, Orders, Quantity, Side, View};
+use crate::market::{Blotter, Cash, Orders, Price, Quantity, Side, View};
 use crate::rl::{BoxSpace, Episode};
 
 use super::reward::{Reward, Rewarded};
@@ -59,10 +59,18 @@ impl Portfolio {
     }
 }
 
-/// What all trades cost in fees by now, in the currency of the run where there is but one.
+/// What all trades cost in fees by now, at the rates of now [currency of the run].
 pub(super) fn fees(view: &View<'_>) -> f64 {
-    let one = |k: usize| view.fees(k);
-    (0..view.instruments().len()).map(one).sum()
+    (0..view.instruments().len()).map(|k| view.fees(k) * rate(view, k)).sum()
+}
+
+/// The currency of the run for one unit of an instrument's; 0 where nobody knows it yet.
+#[inline]
+fn rate(view: &View<'_>, instrument: usize) -> f64 {
+    match view.terms(instrument).currency {
+        0 => 1.0,
+        other => view.balances().get(other).and_then(|balance| balance.rate).map_or(0.0, Price::to_f64),
+    }
 }
 
 impl Task for Portfolio {
@@ -130,7 +138,7 @@ impl Task for Portfolio {
             *own = [
                 within(share(held.to_f64() * one), -LARGEST_SHARE, LARGEST_SHARE),
                 within(share(coming.to_f64() * one), -LARGEST_SHARE, LARGEST_SHARE),
-                within(share(view.unrealized(k)), -1.0, 1.0),
+                within(share(view.unrealized(k) * rate(view, k)), -1.0, 1.0),
             ];
         }
     }

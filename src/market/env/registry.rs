@@ -1,8 +1,6 @@
 //! Market environments by their ids, on data that are generated or given.
 
-use crate::market::{
-    Backtest, Cash, Execution, Instrument, Latencies, Latency, MECHANISMS, Settings, History,
-};
+use crate::market::{Backtest, Cash, Execution, History, Instrument, Latencies, Latency, MECHANISMS, Settings};
 use crate::rl::{Each, EnvEntry, EnvError, EnvRegistry, Occasion, OptionAbout, OptionKind, Options, VecEnv};
 use crate::sim2real::randomize::{Distribution, Level, Randomized, Randomizer, Redraw, Target};
 use crate::sim2real::{Assembly, Parameter, Seed};
@@ -97,16 +95,46 @@ impl Kind {
             Self::MakeMarket => 500,
         };
         let mut all = vec![
-            whole("length", "steps", [length, 0, u64::from(u32::MAX)], "steps of an episode, which begins anywhere; 0 for all data"),
+            whole(
+                "length",
+                "steps",
+                [length, 0, u64::from(u32::MAX)],
+                "steps of an episode, which begins anywhere; 0 for all data",
+            ),
             whole("warm_up", "events", [8, 0, 1_000_000], "events of an episode before its first step"),
-            choice("pace", "data", &["data", "bars", "events", "seconds"], "what a step lasts: until the next bars, or so many events or seconds; data: bars where there are only bars, else an event"),
+            choice(
+                "pace",
+                "data",
+                &["data", "bars", "events", "seconds"],
+                "what a step lasts: until the next bars, or so many events or seconds; data: bars where there are only bars, else an event",
+            ),
             number("every", "", [1.0, 1e-9, 1e9], "how many events or seconds a step lasts"),
         ];
         if self.holds() {
-            all.push(choice("reward", "profit", &["profit", "log_profit", "sharpe"], "relative change of value, its logarithm, or the differential Sharpe ratio"));
-            all.push(number("sharpe_rate", "", [0.01, 1e-6, 1.0], "weight of the newest return in the differential Sharpe ratio"));
-            all.push(number("cost_penalty", "", [0.0, 0.0, 1e3], "how often the fees of a step, over the value, are taken off its reward besides"));
-            all.push(number("drawdown_penalty", "", [0.0, 0.0, 1e3], "how often a deeper drawdown is taken off the reward besides"));
+            all.push(choice(
+                "reward",
+                "profit",
+                &["profit", "log_profit", "sharpe"],
+                "relative change of value, its logarithm, or the differential Sharpe ratio",
+            ));
+            all.push(number(
+                "sharpe_rate",
+                "",
+                [0.01, 1e-6, 1.0],
+                "weight of the newest return in the differential Sharpe ratio",
+            ));
+            all.push(number(
+                "cost_penalty",
+                "",
+                [0.0, 0.0, 1e3],
+                "how often the fees of a step, over the value, are taken off its reward besides",
+            ));
+            all.push(number(
+                "drawdown_penalty",
+                "",
+                [0.0, 0.0, 1e3],
+                "how often a deeper drawdown is taken off the reward besides",
+            ));
             all.push(number("leverage", "", [1.0, 1e-3, 100.0], "what a share of 1 comes to, as a multiple of the value"));
             all.push(number("band", "share", [0.0, 0.0, 1.0], "change of a share below which nothing is traded"));
         }
@@ -117,7 +145,12 @@ impl Kind {
         if self == Self::MakeMarket {
             all.push(number("quote", "units", [100.0, 1e-9, 1e12], "largest quote"));
             all.push(number("inventory", "units", [1_000.0, 1e-9, 1e12], "largest inventory, either way"));
-            all.push(number("inventory_penalty", "ticks", [0.1, 0.0, 1e6], "what the largest inventory costs a step, on the largest quote"));
+            all.push(number(
+                "inventory_penalty",
+                "ticks",
+                [0.1, 0.0, 1e6],
+                "what the largest inventory costs a step, on the largest quote",
+            ));
         }
         all
     }
@@ -136,7 +169,13 @@ impl Kind {
         };
         let kinds = ["bars", "quotes", "book"].map(str::to_owned).into();
         let mut all = vec![
-            OptionAbout::new(Make, "data", "", OptionKind::Choice { nominal: data.into(), of: kinds }, "what data are generated"),
+            OptionAbout::new(
+                Make,
+                "data",
+                "",
+                OptionKind::Choice { nominal: data.into(), of: kinds },
+                "what data are generated",
+            ),
             whole("rows", "", [20_000, 2, 100_000_000], "rows of data an instrument"),
             whole("data_seed", "", [0, 0, 1 << 53], "seed of the data, the same for all lanes and episodes"),
             number("momentum", "", [0.0, -0.99, 0.99], "correlation of a bar's return with the one before"),

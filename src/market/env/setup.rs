@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
+use crate::market::Execution;
 use crate::market::{Backtest, Latencies};
 use crate::rl::Episode;
 use crate::sim2real::{Assembly, Timestamp};
-use crate::market::Execution;
 
 use super::books::Books;
 use super::error::MarketEnvError;
-use super::execution::{Draws, DrawnExecution};
+use super::execution::{DrawnExecution, Draws};
 use super::features::{FeatureSettings, Features};
 use super::pace::{Pace, Pacer};
 
@@ -119,7 +119,8 @@ impl Ready {
         setup.check()?;
         let MarketSetup { backtest, pace, length, warm_up, features, execution } = setup;
         let each = || backtest.histories().iter().zip(&backtest.increments);
-        let tables = each().map(|(history, steps)| Features::of(history, *steps, &features)).collect::<Result<Vec<_>, _>>()?;
+        let tables =
+            each().map(|(history, steps)| Features::of(history, *steps, &features)).collect::<Result<Vec<_>, _>>()?;
         // Only an episode that begins in the midst needs to know what was displayed before.
         let books = each().map(|(history, steps)| length.and_then(|_| Books::of(history, *steps))).collect();
         let draws = execution.map(|execution| Draws::new(execution, backtest.venue())).transpose()?;
@@ -185,12 +186,7 @@ impl Ready {
 
 /// The first row at which an episode may begin, and the number of such rows: behind the warm-up, and as far before the end as the
 /// steps take. An episode of all data begins with the first.
-fn starts(
-    tables: &[Features],
-    pace: Pace,
-    length: Option<u32>,
-    warm_up: usize,
-) -> Result<(usize, usize), MarketEnvError> {
+fn starts(tables: &[Features], pace: Pace, length: Option<u32>, warm_up: usize) -> Result<(usize, usize), MarketEnvError> {
     let Some(length) = length else { return Ok((0, 1)) };
     let rows = tables.first().map_or(0, Features::len);
     let too_long = MarketEnvError::Window { length, warm_up, rows };

@@ -4,6 +4,7 @@
 //! [`Session::step`] with a strategy that asks for nothing, and then [`Session::tell`] of the same event, is to the last bit what a
 //! step is with a strategy that asks at once: nothing happens between what a strategy is shown and what it asks for.
 
+use crate::market::equity_curve::reuse;
 use crate::market::venue::Others;
 use crate::market::{Blotter, DepthBook, Event, MoneyError, Price, Side, View};
 
@@ -46,11 +47,25 @@ impl Session {
         self.keeping.as_ref().map_or(0, |keeping| keeping.record.margin_calls.len())
     }
 
+    /// Goes on in the memory of a session that is over.
+    pub(in crate::market) fn reuse(&mut self, over: &mut Self) {
+        self.equity.reuse(&mut over.equity);
+        let (own, over) = (&mut self.blotter, &mut over.blotter);
+        reuse(&mut own.orders, &mut over.orders);
+        reuse(&mut own.fills, &mut over.fills);
+        reuse(&mut own.terms, &mut over.terms);
+    }
+
     /// Before the first event: the book of an instrument is there already, as the rows before the first made it.
     ///
     /// # Errors
     /// If what is held, which is nothing, cannot be valued.
-    pub(in crate::market) fn begin_with_book(&mut self, instrument: usize, book: DepthBook, others: Others) -> Result<(), MoneyError> {
+    pub(in crate::market) fn begin_with_book(
+        &mut self,
+        instrument: usize,
+        book: DepthBook,
+        others: Others,
+    ) -> Result<(), MoneyError> {
         let (bid, ask) = (book.best(Side::Buy), book.best(Side::Sell));
         self.venue.floors[instrument].begin_with_book(book.clone(), others.clone());
         let known = &mut self.known[instrument];
