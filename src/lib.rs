@@ -55,6 +55,7 @@ pub mod io;
 pub mod market;
 pub mod proof;
 pub mod report;
+pub mod rl;
 pub mod robot;
 pub mod sim2real;
 #[path = "../strategies/mod.rs"]

@@ -41,7 +41,7 @@ fn random(moves: &[(i32, u8)]) -> Backtest {
     Backtest::new(vec![about], vec![of(&rows)], venue(&parts), Settings { seed: Seed(5), latencies, ..settings() }).unwrap()
 }
 
-fn to_the_end(mut session: trueup::market::Session<'_>, strategy: &mut dyn Trader) -> Record {
+fn to_the_end(mut session: trueup::market::Session, strategy: &mut dyn Trader) -> Record {
     while session.step(strategy).unwrap().is_some() {}
     session.finish().unwrap()
 }

@@ -120,6 +120,9 @@ fn every_command_explains_itself() {
         "data",
         "data make",
         "data import",
+        "env",
+        "env list",
+        "env bench",
     ] {
         let ran = scene.run(&format!("{command} --help"));
         assert_eq!((ran.code, ran.err.as_str()), (0, ""), "{command}");

@@ -109,8 +109,12 @@ impl Run {
     }
 }
 
-/// The strategy of `file`.
-pub(super) fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
+/// The strategy that `file` names.
+///
+/// # Errors
+/// If there is no such strategy, or a parameter of it is missing, unknown or of a value that cannot be; if it needs instruments the
+/// run does not have.
+pub fn strategy(file: &RunFile) -> Result<Box<dyn Strategy>, InputError> {
     let table = strategy_table(file)?;
     let built = strategies::build(&table).and_then(|strategy| {
         let instruments: Vec<Instrument> = file.instruments.iter().map(Instrument::from).collect();

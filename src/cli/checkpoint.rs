@@ -119,7 +119,7 @@ impl Turn {
 }
 
 impl<'a> Going<'a> {
-    fn started(&self) -> Result<Session<'a>, InputError> {
+    fn started(&self) -> Result<Session, InputError> {
         self.prepared.start().map_err(|error| self.explained(&error))
     }
 
@@ -128,7 +128,7 @@ impl<'a> Going<'a> {
     }
 
     /// Runs up to a moment; whether it came to it.
-    fn to(&self, session: &mut Session<'_>, strategy: &mut dyn Strategy, moment: Moment) -> Result<bool, InputError> {
+    fn to(&self, session: &mut Session, strategy: &mut dyn Strategy, moment: Moment) -> Result<bool, InputError> {
         loop {
             let (done, of) = session.progress();
             self.progress.tell("running", done, of.unwrap_or_default());
@@ -143,7 +143,7 @@ impl<'a> Going<'a> {
         }
     }
 
-    fn finished(&self, mut session: Session<'_>, strategy: &mut dyn Strategy) -> Result<Record, InputError> {
+    fn finished(&self, mut session: Session, strategy: &mut dyn Strategy) -> Result<Record, InputError> {
         loop {
             let (done, of) = session.progress();
             self.progress.tell("running", done, of.unwrap_or_default());
@@ -165,7 +165,7 @@ impl<'a> Going<'a> {
     /// Runs up to a moment and saves it.
     fn saved(
         &self,
-        session: &mut Session<'_>,
+        session: &mut Session,
         strategy: &mut dyn Strategy,
         at: Moment,
         path: &Path,

@@ -3,6 +3,7 @@
 //! Results go to standard output; progress and what went wrong go to standard error. Exit codes: 0 done, 1 a finding the
 //! caller asked to fail on, 2 bad input, 3 a bug.
 
+mod answer;
 mod audit;
 mod backtest;
 mod calibrate;
@@ -12,6 +13,7 @@ mod data;
 mod demo;
 mod diagnose;
 mod draws;
+mod env;
 mod figures;
 mod fitted;
 mod log_arguments;
@@ -30,6 +32,9 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+pub use answer::{Answer, Listener, Refusal, answer};
+pub use backtest::strategy as strategy_of_run;
 
 use screen::Screen;
 use stop::{Outcome, Stop};
@@ -72,6 +77,7 @@ enum Command {
     Mechanisms(mechanisms::Mechanisms),
     Prove(prove::Prove),
     Data(data::Data),
+    Env(env::Env),
 }
 
 /// Runs the command line of this process.
@@ -119,6 +125,7 @@ impl Command {
             Self::Mechanisms(command) => command.run(screen),
             Self::Prove(command) => command.run(screen),
             Self::Data(command) => command.run(screen),
+            Self::Env(command) => command.run(screen),
         }
     }
 }

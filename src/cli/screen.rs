@@ -8,6 +8,7 @@ use std::time::Duration;
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::answer::Listener;
 use super::stop::Stop;
 use crate::io::InputError;
 use crate::report::Listing;
@@ -16,21 +17,43 @@ use crate::report::Listing;
 const DEFAULT_WIDTH: u16 = 110;
 
 /// Where a command shows what it does and what came of it.
-#[derive(Debug)]
 pub(super) struct Screen {
     width: u16,
     progress: bool,
+    /// A program that takes the place of the terminal.
+    caller: Option<Caller>,
+}
+
+/// What is told to a program.
+struct Caller {
+    text: Mutex<String>,
+    listener: Listener,
 }
 
 impl Screen {
     /// The terminal of this process; `progress` is told even where there is none.
     pub fn new(progress: bool) -> Self {
         let width = Table::new().width().unwrap_or(DEFAULT_WIDTH).clamp(60, 160);
-        Self { width, progress }
+        Self { width, progress, caller: None }
+    }
+
+    /// No terminal: results are kept, and progress is told to `listener`.
+    pub fn collecting(listener: Listener) -> Self {
+        Self { width: DEFAULT_WIDTH, progress: false, caller: Some(Caller { text: Mutex::default(), listener }) }
+    }
+
+    /// What was kept.
+    pub fn collected(self) -> String {
+        self.caller.and_then(|caller| caller.text.into_inner().ok()).unwrap_or_default()
     }
 
     /// Prints a result.
     pub fn print(&self, text: &str) -> Result<(), Stop> {
+        if let Some(caller) = &self.caller {
+            let mut kept = caller.text.lock().map_err(|_| Stop::Bug("a thread has stopped while it told".to_owned()))?;
+            kept.push_str(text);
+            return Ok(());
+        }
         let mut out = std::io::stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
         written.map_err(|error| match error.kind() {
@@ -41,8 +64,9 @@ impl Screen {
 
     /// What tells the progress of one piece of work.
     pub fn progress(&self) -> Progress {
-        let bar = std::io::stderr().is_terminal().then(bar);
-        Progress { lines: self.progress && bar.is_none(), bar, last: Mutex::new(String::new()) }
+        let listener = self.caller.as_ref().map(|caller| Listener::clone(&caller.listener));
+        let bar = (listener.is_none() && std::io::stderr().is_terminal()).then(bar);
+        Progress { lines: self.progress && bar.is_none(), bar, listener, last: Mutex::new(String::new()) }
     }
 
     /// A table with these heads over its columns; those that begin with `>` hold numbers and are aligned right.
@@ -116,9 +140,9 @@ fn bar() -> ProgressBar {
 }
 
 /// Tells the steps of one piece of work, and wipes them away when dropped.
-#[derive(Debug)]
 pub(super) struct Progress {
     bar: Option<ProgressBar>,
+    listener: Option<Listener>,
     /// Whether each step is a line of its own.
     lines: bool,
     last: Mutex<String>,
@@ -127,6 +151,9 @@ pub(super) struct Progress {
 impl Progress {
     /// Tells that `step` is being done, and how many of how many parts of it lie behind; 0 where nobody knows how many there are.
     pub fn tell(&self, step: &str, done: usize, of: usize) {
+        if let Some(listener) = &self.listener {
+            listener(step, done, of);
+        }
         if let Some(bar) = &self.bar {
             bar.set_message(step.to_owned());
             match of {
@@ -159,14 +186,14 @@ mod tests {
 
     #[test]
     fn text_is_wrapped_between_words() {
-        let screen = Screen { width: 10, progress: false };
+        let screen = Screen { width: 10, progress: false, caller: None };
         assert_eq!(screen.wrapped("- ", "one two three four"), "- one two\n  three\n  four");
         assert_eq!(screen.wrapped("", "one two three"), "one two\nthree");
     }
 
     #[test]
     fn tables_fit_the_terminal() {
-        let screen = Screen { width: 60, progress: false };
+        let screen = Screen { width: 60, progress: false, caller: None };
         let mut table = screen.table(["name", ">value"]);
         table.add_row(["x".repeat(10), "word ".repeat(40)]);
         assert!(table.trim_fmt().lines().all(|line| line.chars().count() <= 60));

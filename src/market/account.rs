@@ -300,7 +300,7 @@ fn nearest(number: i64, by: u32, over: u32) -> i64 {
     i64::try_from(size).unwrap_or(if size > 0 { i64::MAX } else { i64::MIN })
 }
 
-impl Session<'_> {
+impl Session {
     /// The error of an amount at an event.
     pub(super) fn money(&self, event: Event, error: MoneyError) -> BacktestError {
         let symbol = &self.setup.instruments[event.instrument].symbol;

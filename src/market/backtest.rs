@@ -254,7 +254,7 @@ pub struct DataSeen {
 }
 
 impl DataSeen {
-    pub(super) fn of(line: &Line<'_>) -> Self {
+    pub(super) fn of(line: &Line) -> Self {
         let finer = [RowKind::Trades, RowKind::Depth, RowKind::Orders, RowKind::Quotes];
         Self {
             quoted: line.tells(RowKind::Quotes),
@@ -370,8 +370,24 @@ impl Backtest {
 
     /// Starts it, before its first event.
     #[must_use]
-    pub fn start(&self) -> Session<'_> {
-        Session::new(self, Feed::new(&self.histories))
+    pub fn start(&self) -> Session {
+        let feed = Feed::new(&self.histories);
+        let room = feed.rows();
+        Session::new(Arc::new(self.clone()), feed, room)
+    }
+
+    /// Starts it in the midst of its data: rows that were known before `from` are left out, which is found by bisection. The books of
+    /// data that tell them change by change are empty then, and fill as changes come.
+    ///
+    /// It is the run of [`on`](Self::on) the rows from there, without a copy of them.
+    #[must_use]
+    pub fn start_from(self: &Arc<Self>, from: Timestamp) -> Session {
+        self.start_with_room(from, None)
+    }
+
+    /// The same, with room for the equity of so many events.
+    pub(super) fn start_with_room(self: &Arc<Self>, from: Timestamp, room: Option<usize>) -> Session {
+        Session::new(Arc::clone(self), Feed::from(&self.histories, from), room)
     }
 
     /// Starts it on streams, one set an instrument, before its first event: of the data only what lies around the present is in
@@ -379,7 +395,7 @@ impl Backtest {
     ///
     /// # Errors
     /// What the streams refuse of their first rows; not as many sets as instruments; no data at all.
-    pub fn start_on(&self, sources: Vec<Sources>) -> Result<Session<'_>, BacktestError> {
+    pub fn start_on(&self, sources: Vec<Sources>) -> Result<Session, BacktestError> {
         let (instruments, histories) = (self.instruments.len(), sources.len());
         if instruments != histories {
             return Err(BacktestError::Unmatched { instruments, histories });
@@ -388,7 +404,8 @@ impl Backtest {
         if feed.peek().is_none() {
             return Err(BacktestError::NoData);
         }
-        Ok(Session::new(self, feed))
+        let room = feed.rows();
+        Ok(Session::new(Arc::new(self.clone()), feed, room))
     }
 
     /// Runs it from the first event to the last.

@@ -6,7 +6,7 @@ use super::session::Session;
 use super::venue::{Filled, Outcome, What};
 use super::{Cash, Fill, FillCost, News, Notice, Quantity, Status, Trade, Why};
 
-impl Session<'_> {
+impl Session {
     /// Takes what happened on a floor, which its owner will know in a while.
     pub(super) fn settle(&mut self, instrument: usize) -> Result<(), BacktestError> {
         if self.venue.floors[instrument].is_quiet() {

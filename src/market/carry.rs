@@ -23,7 +23,7 @@ impl Carry {
     }
 }
 
-impl Session<'_> {
+impl Session {
     /// Charges all positions once a day of UTC, at the first event of the next. So it is with exchange calendars too: what is
     /// charged goes by the time held, over nights and weekends, and not by when it is booked.
     #[inline]

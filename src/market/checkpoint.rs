@@ -90,7 +90,7 @@ impl Write for Digested {
     }
 }
 
-impl Session<'_> {
+impl Session {
     /// The moment it is at.
     #[must_use]
     pub fn checkpoint(&self) -> Checkpoint {

@@ -1,5 +1,7 @@
 //! Dividends and splits: what they do to what is held, to orders that work, and to what is known.
 
+use std::sync::Arc;
+
 use crate::sim2real::Timestamp;
 
 use super::account::{ActionKind, BookedAction, CorporateAction, Ratio};
@@ -9,7 +11,7 @@ use super::session::Session;
 use super::venue::Resting;
 use super::{Arrival, Bar, Dividend, Event, EventKind, LedgerError, MoneyError, OrderId, Reason, Split, Strategy};
 
-impl Session<'_> {
+impl Session {
     /// The ex-instant of an action has come. What became of orders of its instrument before is known to their owner now
     /// at the latest, so that it is booked in the units of before.
     pub(super) fn take_action(
@@ -67,8 +69,8 @@ impl Session<'_> {
 
     fn book_action(&mut self, action: &CorporateAction) -> Result<(), BacktestError> {
         let CorporateAction { at, instrument, kind } = *action;
-        let symbol = &self.setup.instruments[instrument].symbol;
-        let place = || format!("{symbol} at {at}");
+        let setup = Arc::clone(&self.setup);
+        let place = || format!("{} at {at}", setup.instruments[instrument].symbol);
         let failed = |error: LedgerError| match error {
             LedgerError::Money(error) => BacktestError::Money { place: place(), error },
             error => BacktestError::Account { place: place(), error },

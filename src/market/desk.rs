@@ -11,7 +11,7 @@ use super::{
     Side, Status, Ticket, TimeInForce,
 };
 
-impl Session<'_> {
+impl Session {
     /// Sends what the strategy asked for, or refuses it.
     pub(super) fn send_all(&mut self, now: Timestamp, equity: Cash) {
         let mut orders = std::mem::take(&mut self.orders);

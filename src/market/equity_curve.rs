@@ -34,6 +34,11 @@ impl EquityCurve {
         Self { every, points: Vec::with_capacity(room), now: None, sum: 0.0, count: 0 }
     }
 
+    /// Goes on in the memory of another that is over, where that has more.
+    pub fn reuse(&mut self, over: &mut Self) {
+        reuse(&mut self.points, &mut over.points);
+    }
+
     /// The equity of now.
     #[inline(always)]
     pub fn push(&mut self, time: Timestamp, equity: f64) {
@@ -82,6 +87,16 @@ impl EquityCurve {
                 self.points.push(point);
             }
         }
+    }
+}
+
+/// `rows` go on in the memory of those of `over`, where that has more: a run of any length leaves memory behind that the next one
+/// would have to ask the system for.
+pub(super) fn reuse<T>(rows: &mut Vec<T>, over: &mut Vec<T>) {
+    if over.capacity() > rows.capacity() {
+        over.clear();
+        over.append(rows);
+        std::mem::swap(rows, over);
     }
 }
 

@@ -1,5 +1,7 @@
 //! The histories of all instruments, merged by when things happened.
 
+use std::sync::Arc;
+
 use crate::sim2real::Timestamp;
 
 use super::line::Line;
@@ -31,8 +33,8 @@ pub struct Arrival {
 /// Everything that happens, in order: by time; at one time by instrument, and within it bars, trades, changes of the book,
 /// quotes.
 #[derive(Debug)]
-pub struct Feed<'d> {
-    lines: Vec<Line<'d>>,
+pub struct Feed {
+    lines: Vec<Line>,
     tracks: Vec<Track>,
     /// Next time of each track.
     times: Vec<Timestamp>,
@@ -42,22 +44,35 @@ pub struct Feed<'d> {
     low: Option<u32>,
 }
 
-impl<'d> Feed<'d> {
+impl Feed {
     /// A feed of the given histories, one an instrument.
     #[must_use]
-    pub fn new(histories: &'d [History]) -> Self {
+    pub fn new(histories: &[History]) -> Self {
         Self::of(histories.iter().map(Line::whole).collect())
+    }
+
+    /// The same without the rows that were known before `from`.
+    #[must_use]
+    pub fn from(histories: &[History], from: Timestamp) -> Self {
+        let mut feed = Self::new(histories);
+        for (track, time) in feed.tracks.iter_mut().zip(&mut feed.times) {
+            let line = &feed.lines[track.instrument];
+            track.next = line.first_known(track.kind, from);
+            *time = line.time(track.kind, track.next);
+        }
+        feed.build();
+        feed
     }
 
     /// A feed of streams, of each instrument those at its place. It is for who reads on when it [is low](Self::is_low).
     ///
     /// # Errors
     /// What the streams refuse of their first rows.
-    pub fn streaming(sources: Vec<Sources>) -> Result<Feed<'static>, StreamError> {
+    pub fn streaming(sources: Vec<Sources>) -> Result<Self, StreamError> {
         Ok(Feed::of(sources.into_iter().map(Line::of).collect::<Result<_, _>>()?))
     }
 
-    fn of(lines: Vec<Line<'d>>) -> Self {
+    fn of(lines: Vec<Line>) -> Self {
         let all = lines.iter().enumerate().flat_map(|(instrument, line)| {
             let told = RowKind::ALL.into_iter().filter(|kind| line.tells(*kind));
             told.map(move |kind| Track { instrument, kind, next: 0 })
@@ -92,12 +107,12 @@ impl<'d> Feed<'d> {
 
     /// The data of an instrument.
     #[inline(always)]
-    pub(super) fn line(&self, instrument: usize) -> &Line<'d> {
+    pub(super) fn line(&self, instrument: usize) -> &Line {
         &self.lines[instrument]
     }
 
     /// The data of all instruments.
-    pub(super) fn lines(&self) -> &[Line<'d>] {
+    pub(super) fn lines(&self) -> &[Line] {
         &self.lines
     }
 
@@ -125,21 +140,22 @@ impl<'d> Feed<'d> {
         self.lines[instrument].read_on(kind, next, keep)
     }
 
-    /// The bars of an instrument that come next, where they are in memory, and when other data come between them.
-    pub(super) fn bars_alone(&self) -> Option<(usize, &'d [Bar], Timestamp)> {
+    /// The bars of an instrument, where they are in memory and one of them comes next: all of them, the number of the next, and
+    /// when other data come between.
+    pub(super) fn bars_alone(&self) -> Option<(usize, &Arc<Vec<Bar>>, usize, Timestamp)> {
         let winner = *self.losers.first()?;
         let Track { instrument, kind, next } = self.tracks[winner as usize];
         if kind != RowKind::Bars {
             return None;
         }
-        let bars = self.lines[instrument].all_bars()?.get(next..)?;
+        let bars = self.lines[instrument].all_bars()?;
         // The winner has beaten all others: who comes second is among the losers on its way.
         let (mut node, mut end) = ((self.tracks.len() + winner as usize) / 2, Timestamp::MAX);
         while node > 0 {
             end = end.min(self.times[self.losers[node] as usize]);
             node /= 2;
         }
-        Some((instrument, bars, end))
+        Some((instrument, bars, next, end))
     }
 
     /// The first `count` of [these bars](Self::bars_alone) are over.
@@ -188,7 +204,7 @@ impl<'d> Feed<'d> {
     }
 }
 
-impl Iterator for Feed<'_> {
+impl Iterator for Feed {
     type Item = Arrival;
 
     #[inline(always)]

@@ -12,6 +12,8 @@
 //! Source: the pauses of limit up, limit down (National Market System Plan, 2012) and of single stocks for news (Nasdaq rule 4120,
 //! NYSE rule 123D).
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use crate::sim2real::Timestamp;
@@ -135,20 +137,20 @@ pub(super) fn check_halts(halts: &[Halt], instruments: &[Instrument]) -> Result<
 
 /// The halts of one instrument.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Halts<'d> {
+pub(super) struct Halts {
     /// In order of time, each with its number in the run.
-    all: Vec<(usize, &'d Halt)>,
+    all: Vec<(usize, Arc<Halt>)>,
     /// Rows of the time of each.
     rows: Vec<usize>,
 }
 
-impl<'d> Halts<'d> {
+impl Halts {
     /// The halts of each of `count` instruments; nothing at all where there are none.
-    pub fn of(halts: &'d [Halt], count: usize) -> Vec<Self> {
+    pub fn of(halts: &[Halt], count: usize) -> Vec<Self> {
         let mut each = vec![Self::default(); if halts.is_empty() { 0 } else { count }];
         for (number, halt) in halts.iter().enumerate() {
             if let Some(own) = each.get_mut(halt.instrument) {
-                own.all.push((number, halt));
+                own.all.push((number, Arc::new(halt.clone())));
                 own.rows.push(0);
             }
         }
@@ -167,8 +169,8 @@ impl<'d> Halts<'d> {
     }
 
     /// The halt that is under way at `time`, as far as it is known then.
-    pub fn under_way(&self, time: Timestamp) -> Option<UnderHalt<'d>> {
-        let (_, halt) = self.all[self.at(time)?];
+    pub fn under_way(&self, time: Timestamp) -> Option<UnderHalt<'_>> {
+        let (_, halt) = &self.all[self.at(time)?];
         Some(UnderHalt { since: halt.from, reason: halt.reason.as_deref() })
     }
 
@@ -179,7 +181,7 @@ impl<'d> Halts<'d> {
         }
         // Up to the very end of a halt there was nothing: what traded in the bar did so before.
         let begun = self.all.partition_point(|(_, halt)| halt.from < bar.known_at);
-        let last = begun.checked_sub(1).map(|last| self.all[last].1).filter(|halt| bar.known_at <= halt.to);
+        let last = begun.checked_sub(1).map(|last| &self.all[last].1).filter(|halt| bar.known_at <= halt.to);
         Some(Bar { known_at: last.map_or(bar.known_at, |halt| halt.from), ..bar })
     }
 
@@ -187,11 +189,11 @@ impl<'d> Halts<'d> {
         self.all
             .iter()
             .zip(&self.rows)
-            .map(|((number, halt), rows)| (*number, HaltSeen { halt: (*halt).clone(), rows: *rows }))
+            .map(|((number, halt), rows)| (*number, HaltSeen { halt: (**halt).clone(), rows: *rows }))
     }
 }
 
-impl Timetable<'_> {
+impl Timetable {
     /// What a run saw of its halts, in the order in which it names them.
     pub fn halts_seen(&self) -> Vec<HaltSeen> {
         let mut all: Vec<(usize, HaltSeen)> = self.halts().iter().flat_map(Halts::seen).collect();
@@ -213,7 +215,7 @@ impl Timetable<'_> {
     }
 }
 
-impl Session<'_> {
+impl Session {
     /// Trading of an instrument stops or goes on, as its halts have it at `now`.
     pub(super) fn keep_halts(&mut self, instrument: usize, now: Timestamp) {
         let Some(halts) = self.timetable.halts().get(instrument).filter(|halts| !halts.is_empty()) else { return };

@@ -195,6 +195,12 @@ impl History {
         &self.bars
     }
 
+    /// Its bars, for who keeps them while it goes on with something else.
+    #[inline(always)]
+    pub(super) fn shared_bars(&self) -> &Arc<Vec<Bar>> {
+        &self.bars
+    }
+
     /// Its bars alone, oldest first.
     #[must_use]
     pub fn into_bars(self) -> Vec<Bar> {

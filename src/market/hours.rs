@@ -13,6 +13,8 @@
 //! A calendar knows closings that were announced late from the beginning, as that of September 2001: an order for the next
 //! day then waits for the day there was.
 
+use std::sync::Arc;
+
 use chrono::NaiveDate;
 
 use crate::sim2real::Timestamp;
@@ -28,8 +30,8 @@ const DAY: i64 = 86_400 * Timestamp::NANOS;
 
 /// The hours of one instrument, and where a run is in them.
 #[derive(Debug, Clone)]
-pub(super) struct TradingHours<'d> {
-    trading: Trading<'d>,
+pub(super) struct TradingHours {
+    trading: Trading,
     /// The day that was asked for last.
     day: Option<Hours>,
     /// The session in which something happened last.
@@ -48,9 +50,9 @@ struct InSession {
     day: Hours,
 }
 
-impl<'d> TradingHours<'d> {
-    fn new(calendar: &'d Calendar) -> Self {
-        let trading = Trading::new(calendar);
+impl TradingHours {
+    fn new(calendar: &Arc<Calendar>) -> Self {
+        let trading = Trading::new(Arc::clone(calendar));
         Self { trading, day: None, session: None, last_bar_of: None, close_due: None, outside: 0 }
     }
 
@@ -59,7 +61,7 @@ impl<'d> TradingHours<'d> {
         self.trading.seen_at(time)
     }
 
-    pub fn calendar(&self) -> &'d Calendar {
+    pub fn calendar(&self) -> &Calendar {
         self.trading.calendar()
     }
 
@@ -95,18 +97,18 @@ impl<'d> TradingHours<'d> {
 
 /// The hours of all instruments.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Timetable<'d> {
+pub(super) struct Timetable {
     /// Of each instrument; nothing at all where none has a calendar.
-    each: Vec<Option<TradingHours<'d>>>,
+    each: Vec<Option<TradingHours>>,
     /// Of each instrument; nothing at all where none is ever halted.
-    halts: Vec<Halts<'d>>,
+    halts: Vec<Halts>,
     /// The end of the last bar that outlasted its session: what became of orders in it is known no earlier.
     pub known_from: Timestamp,
 }
 
-impl<'d> Timetable<'d> {
+impl Timetable {
     /// Of `count` instruments, with the calendars of the first of them, and their halts.
-    pub fn new(calendars: impl Iterator<Item = Option<&'d Calendar>>, halts: &'d [Halt], count: usize) -> Self {
+    pub fn new<'c>(calendars: impl Iterator<Item = Option<&'c Arc<Calendar>>>, halts: &[Halt], count: usize) -> Self {
         let mut each: Vec<_> = calendars.map(|calendar| calendar.map(TradingHours::new)).collect();
         if each.iter().any(Option::is_some) {
             each.resize(count, None);
@@ -123,12 +125,12 @@ impl<'d> Timetable<'d> {
     }
 
     /// The halts of each instrument; nothing at all where there are none.
-    pub fn halts(&self) -> &[Halts<'d>] {
+    pub fn halts(&self) -> &[Halts] {
         &self.halts
     }
 
     /// Those of one.
-    pub fn halts_mut(&mut self, instrument: usize) -> Option<&mut Halts<'d>> {
+    pub fn halts_mut(&mut self, instrument: usize) -> Option<&mut Halts> {
         self.halts.get_mut(instrument)
     }
 
@@ -139,13 +141,13 @@ impl<'d> Timetable<'d> {
     }
 
     /// Of each instrument.
-    pub fn each(&self) -> &[Option<TradingHours<'d>>] {
+    pub fn each(&self) -> &[Option<TradingHours>] {
         &self.each
     }
 
     /// Of an instrument, where it has a calendar.
     #[inline]
-    pub fn of(&mut self, instrument: usize) -> Option<&mut TradingHours<'d>> {
+    pub fn of(&mut self, instrument: usize) -> Option<&mut TradingHours> {
         self.each.get_mut(instrument)?.as_mut()
     }
 
@@ -155,7 +157,7 @@ impl<'d> Timetable<'d> {
     }
 }
 
-impl Session<'_> {
+impl Session {
     /// The doors of an instrument's floor are opened or closed, as its calendar and its halts have it at `now`.
     pub(super) fn keep_hours(&mut self, instrument: usize, now: Timestamp) {
         self.keep_halts(instrument, now);

@@ -40,7 +40,7 @@ pub(super) struct Known {
 
 impl Known {
     /// Takes in what changed in the book, and gives its mid in whole 1e-9.
-    pub fn learn_depth(&mut self, line: &Line<'_>, arrival: &Arrival) -> Option<Price> {
+    pub fn learn_depth(&mut self, line: &Line, arrival: &Arrival) -> Option<Price> {
         let book = self.book.as_mut()?;
         let rows = arrival.row..arrival.end;
         if line.tells(RowKind::Orders) {

@@ -1,6 +1,7 @@
 //! The data of one instrument as a feed reads them: whole, or from streams with some rows around the present at hand.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::sim2real::Timestamp;
 
@@ -10,8 +11,8 @@ use super::{Bar, Book, DataNotes, DepthChange, History, OrderEvent, Print, Quote
 
 /// The data of one instrument. Rows are known by their numbers from the first of all, be it at hand or not.
 #[derive(Debug)]
-pub(super) struct Line<'d> {
-    data: Data<'d>,
+pub(super) struct Line {
+    data: Data,
     /// Which kinds there are.
     kinds: [bool; RowKind::COUNT],
     /// Number of the first row at hand.
@@ -21,34 +22,10 @@ pub(super) struct Line<'d> {
 }
 
 #[derive(Debug)]
-enum Data<'d> {
-    Whole(&'d History, Rows<'d>),
+enum Data {
+    /// It shares its rows with whoever else runs on them.
+    Whole(History),
     Part(Box<Part>),
-}
-
-/// Rows at hand, each a step away.
-#[derive(Debug, Clone, Copy)]
-struct Rows<'a> {
-    bars: &'a [Bar],
-    quotes: &'a Quotes,
-    prints: &'a [Print],
-    prints_known: &'a [Timestamp],
-    depth: &'a [DepthChange],
-    order_events: &'a [OrderEvent],
-}
-
-impl<'a> Rows<'a> {
-    #[inline(always)]
-    fn of(history: &'a History) -> Self {
-        Self {
-            bars: history.bars(),
-            quotes: history.quotes(),
-            prints: history.prints(),
-            prints_known: history.prints_known(),
-            depth: history.depth(),
-            order_events: history.order_events(),
-        }
-    }
 }
 
 /// What is at hand of streams.
@@ -60,12 +37,12 @@ struct Part {
     prints: Vec<Known<Print>>,
 }
 
-impl<'d> Line<'d> {
+impl Line {
     /// A history that is in memory as a whole.
-    pub fn whole(history: &'d History) -> Self {
+    pub fn whole(history: &History) -> Self {
         let kinds = RowKind::ALL.map(|kind| count(history, kind) > 0);
         let (first, limit) = ([0; RowKind::COUNT], [usize::MAX; RowKind::COUNT]);
-        Self { data: Data::Whole(history, Rows::of(history)), kinds, first, limit }
+        Self { data: Data::Whole(history.clone()), kinds, first, limit }
     }
 
     /// What streams give; the first rows of each are read at once.
@@ -83,16 +60,16 @@ impl<'d> Line<'d> {
 
     /// The same once more, where its data are in memory as a whole: streams give their rows once.
     pub fn forked(&self) -> Option<Self> {
-        match self.data {
-            Data::Whole(history, rows) => Some(Self { data: Data::Whole(history, rows), ..*self }),
+        match &self.data {
+            Data::Whole(history) => Some(Self { data: Data::Whole(history.clone()), ..*self }),
             Data::Part(_) => None,
         }
     }
 
     /// All bars, where they are in memory.
-    pub fn all_bars(&self) -> Option<&'d [Bar]> {
-        match self.data {
-            Data::Whole(_, rows) => Some(rows.bars),
+    pub fn all_bars(&self) -> Option<&Arc<Vec<Bar>>> {
+        match &self.data {
+            Data::Whole(history) => Some(history.shared_bars()),
             Data::Part(_) => None,
         }
     }
@@ -101,7 +78,7 @@ impl<'d> Line<'d> {
     #[cfg(feature = "io")]
     pub fn into_at_hand(self) -> History {
         match self.data {
-            Data::Whole(history, _) => history.clone(),
+            Data::Whole(history) => history,
             Data::Part(part) => part.at_hand,
         }
     }
@@ -114,7 +91,7 @@ impl<'d> Line<'d> {
     /// Number of all rows, where they are in memory.
     pub fn rows(&self) -> Option<usize> {
         match &self.data {
-            Data::Whole(history, _) => Some(history.rows()),
+            Data::Whole(history) => Some(history.rows()),
             Data::Part(_) => None,
         }
     }
@@ -122,17 +99,15 @@ impl<'d> Line<'d> {
     /// What was found in the data as far as they were read.
     pub fn notes(&self) -> Vec<DataNotes> {
         match &self.data {
-            Data::Whole(history, _) => history.notes().to_vec(),
+            Data::Whole(history) => history.notes().to_vec(),
             Data::Part(part) => part.sources.notes(),
         }
     }
 
-    // One table at a time: all of them together are more than registers hold.
-
     #[inline(always)]
     fn bars(&self) -> &[Bar] {
         match &self.data {
-            Data::Whole(_, rows) => rows.bars,
+            Data::Whole(history) => history.bars(),
             Data::Part(part) => part.at_hand.bars(),
         }
     }
@@ -140,7 +115,7 @@ impl<'d> Line<'d> {
     #[inline(always)]
     fn all_quotes(&self) -> &Quotes {
         match &self.data {
-            Data::Whole(_, rows) => rows.quotes,
+            Data::Whole(history) => history.quotes(),
             Data::Part(part) => part.at_hand.quotes(),
         }
     }
@@ -148,7 +123,7 @@ impl<'d> Line<'d> {
     #[inline(always)]
     fn prints(&self) -> &[Print] {
         match &self.data {
-            Data::Whole(_, rows) => rows.prints,
+            Data::Whole(history) => history.prints(),
             Data::Part(part) => part.at_hand.prints(),
         }
     }
@@ -156,7 +131,7 @@ impl<'d> Line<'d> {
     #[inline(always)]
     fn changes(&self) -> &[DepthChange] {
         match &self.data {
-            Data::Whole(_, rows) => rows.depth,
+            Data::Whole(history) => history.depth(),
             Data::Part(part) => part.at_hand.depth(),
         }
     }
@@ -164,7 +139,7 @@ impl<'d> Line<'d> {
     #[inline(always)]
     fn events(&self) -> &[OrderEvent] {
         match &self.data {
-            Data::Whole(_, rows) => rows.order_events,
+            Data::Whole(history) => history.order_events(),
             Data::Part(part) => part.at_hand.order_events(),
         }
     }
@@ -173,7 +148,7 @@ impl<'d> Line<'d> {
     #[inline(always)]
     fn prints_known(&self) -> &[Timestamp] {
         match &self.data {
-            Data::Whole(_, rows) => rows.prints_known,
+            Data::Whole(history) => history.prints_known(),
             Data::Part(part) => part.at_hand.prints_known(),
         }
     }
@@ -248,6 +223,20 @@ impl<'d> Line<'d> {
             RowKind::Bars | RowKind::Quotes => None,
         };
         known_at.map_or(time, |known_at| known_at.max(time))
+    }
+
+    /// The first row at hand that was known at `from` or later.
+    pub fn first_known(&self, kind: RowKind, from: Timestamp) -> usize {
+        let before = |time: &Timestamp| *time < from;
+        let place = match kind {
+            RowKind::Bars => self.bars().partition_point(|bar| bar.known_at < from),
+            RowKind::Quotes => self.all_quotes().times().partition_point(before),
+            RowKind::Trades if self.prints_known().is_empty() => self.prints().partition_point(|print| print.time < from),
+            RowKind::Trades => self.prints_known().partition_point(before),
+            RowKind::Depth => self.changes().partition_point(|change| change.known_at < from),
+            RowKind::Orders => self.events().partition_point(|event| event.known_at < from),
+        };
+        self.first[kind as usize] + place
     }
 
     /// One row behind the last of those that belong to the same instant as `row`: a book is told in many changes, and is

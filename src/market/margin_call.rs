@@ -6,7 +6,7 @@ use super::backtest::BacktestError;
 use super::session::Session;
 use super::{Cash, Closing, Condition, Event, Ledger, Margin, MoneyError, OrderId, Quantity, Sender, Side, Ticket, Trade};
 
-impl Session<'_> {
+impl Session {
     /// Whether equity covers the initial margin of what is held with all that is under way and an order beside, or the order
     /// makes that less.
     pub(super) fn has_margin_for(&self, ticket: &Ticket) -> bool {

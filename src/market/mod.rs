@@ -31,6 +31,7 @@ mod desk;
 mod draw_page;
 #[cfg(feature = "io")]
 mod draws;
+pub mod env;
 mod equity_curve;
 mod execution;
 mod feed;
@@ -145,6 +146,7 @@ pub use depth::{DepthAction, DepthChange, OrderAction, OrderEvent};
 pub use depth_book::DepthBook;
 #[cfg(feature = "io")]
 pub use draws::{DrawOutcome, DrawnRun, DrawsSummary, RunDraws};
+pub use env::ENVIRONMENTS;
 pub use execution::{Executed, Execution, ExecutionEffect, Met, Report, cost_bps, fee_bps};
 pub use feed::{Arrival, Feed};
 pub use foresight::Foresight;

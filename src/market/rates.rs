@@ -7,7 +7,7 @@ use super::backtest::BacktestError;
 use super::session::Session;
 use super::{Arrival, Multiplier, Price};
 
-impl Session<'_> {
+impl Session {
     /// Takes the rates that are known by `now`.
     #[inline]
     pub(super) fn look_up_rates(&mut self, now: Timestamp) {

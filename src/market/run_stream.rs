@@ -35,7 +35,7 @@ impl PreparedRun {
     ///
     /// # Errors
     /// Files that cannot be opened any more, and what is refused of their first rows.
-    pub fn start(&self) -> Result<Session<'_>, BacktestError> {
+    pub fn start(&self) -> Result<Session, BacktestError> {
         match &self.streamed {
             None => Ok(self.backtest.start()),
             Some(run) => {

@@ -1,6 +1,7 @@
 //! A backtest under way: feed, strategy, venue and ledger, one event at a time.
 
 use std::fmt;
+use std::sync::Arc;
 
 use crate::sim2real::Timestamp;
 
@@ -25,13 +26,14 @@ use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger,
 
 mod clocked;
 mod exchange;
+mod outside;
 mod quiet;
 mod telling;
 
 /// A backtest under way.
-pub struct Session<'d> {
-    pub(super) setup: &'d Backtest,
-    pub(super) feed: Feed<'d>,
+pub struct Session {
+    pub(super) setup: Arc<Backtest>,
+    pub(super) feed: Feed,
     transit: Transit,
     /// Trades value what is held: there is nothing else that could.
     trades_mark: Vec<bool>,
@@ -41,7 +43,7 @@ pub struct Session<'d> {
     can_be_quiet: bool,
     pub(super) agenda: Agenda,
     pub(super) clocks: Clocks,
-    pub(super) timetable: Timetable<'d>,
+    pub(super) timetable: Timetable,
     pub(super) known: Vec<Known>,
     pub(super) daily: Vec<Daily>,
     pub(super) venue: Venue,
@@ -66,14 +68,14 @@ pub struct Session<'d> {
     pub(super) keeping: Option<Box<Keeping>>,
 }
 
-impl fmt::Debug for Session<'_> {
+impl fmt::Debug for Session {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Session").field("events", &self.held.events).finish_non_exhaustive()
     }
 }
 
 /// How finely the data of an instrument know its market.
-fn detail(line: &Line<'_>) -> Detail {
+fn detail(line: &Line) -> Detail {
     if line.tells(RowKind::Orders) {
         Detail::ByOrder
     } else if line.tells(RowKind::Depth) {
@@ -85,8 +87,9 @@ fn detail(line: &Line<'_>) -> Detail {
     }
 }
 
-impl<'d> Session<'d> {
-    pub(super) fn new(setup: &'d Backtest, feed: Feed<'d>) -> Self {
+impl Session {
+    /// A session before its first event, with room for the equity of so many of them.
+    pub(super) fn new(setup: Arc<Backtest>, feed: Feed, room: Option<usize>) -> Self {
         let Settings { seed, reference, matching, latencies, equity_every, .. } = setup.settings.clone();
         let stale = StaleQuotes::delay_before(&setup.venue);
         let reference = reference.unwrap_or_else(|| Reference::suiting(&setup.venue));
@@ -127,7 +130,7 @@ impl<'d> Session<'d> {
         let mut venue = Venue::new(&setup.venue, &venue);
         let conceding = venue.conceding.len();
         let count = setup.instruments.len();
-        let calendars = setup.settings.calendars.iter().map(Option::as_deref);
+        let calendars = setup.settings.calendars.iter().map(Option::as_ref);
         let timetable = Timetable::new(calendars, &setup.settings.halts, count);
         for k in (0..count).filter(|k| timetable.keeps(*k)) {
             let has_hours = timetable.each().get(k).is_some_and(Option::is_some);
@@ -138,7 +141,7 @@ impl<'d> Session<'d> {
         let (ledger, keeping) = Keeping::start(&setup.settings, count, origin, &mut agenda);
         let mut session = Self {
             setup,
-            equity: EquityCurve::new(equity_every, feed.rows()),
+            equity: EquityCurve::new(equity_every, room),
             feed,
             trades_mark,
             transit: Transit::new(count),
@@ -190,7 +193,7 @@ impl<'d> Session<'d> {
     #[must_use]
     pub fn fork(&self) -> Option<Self> {
         Some(Self {
-            setup: self.setup,
+            setup: Arc::clone(&self.setup),
             feed: self.feed.forked()?,
             transit: self.transit.clone(),
             trades_mark: self.trades_mark.clone(),

@@ -8,8 +8,8 @@ use super::known::Known;
 use super::rates::multiplied;
 use super::{
     Balance, Bar, Bracket, Calendar, Cash, Condition, CorporateAction, DepthBook, Hours, Increments, Instrument, Ledger,
-    Link, Margin, OpenOrder, OrderId, OrderKind, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side, Terms,
-    Ticket, UnderHalt,
+    Link, Margin, OpenOrder, OrderId, OrderKind, Position, Price, Print, Quantity, QuoteSlice, Reason, Request, Role, Side,
+    Terms, Ticket, UnderHalt,
 };
 
 /// What brought an event about; in the order in which they come at one instant.
@@ -64,8 +64,8 @@ pub struct View<'a> {
     pub(super) increments: &'a [Increments],
     pub(super) ledger: &'a Ledger,
     pub(super) equity: Cash,
-    pub(super) hours: &'a [Option<TradingHours<'a>>],
-    pub(super) halts: &'a [Halts<'a>],
+    pub(super) hours: &'a [Option<TradingHours>],
+    pub(super) halts: &'a [Halts],
 }
 
 impl<'a> View<'a> {
@@ -150,6 +150,12 @@ impl<'a> View<'a> {
         self.increments.get(instrument).map_or(Quantity::ZERO, |steps| steps.whole_lots(quantity))
     }
 
+    /// `quantity` and one lot more of an instrument.
+    #[must_use]
+    pub fn next_lot(&self, instrument: usize, quantity: Quantity) -> Quantity {
+        self.increments.get(instrument).map_or(quantity, |steps| quantity + steps.lot())
+    }
+
     /// The session of an instrument now, with its open and close; none while its market is closed, and where it has no
     /// calendar.
     #[must_use]
@@ -186,6 +192,20 @@ impl<'a> View<'a> {
     #[must_use]
     pub fn position(&self, instrument: usize) -> Quantity {
         self.ledger.positions().get(instrument).map_or(Quantity::ZERO, |position| position.quantity)
+    }
+
+    /// Fees paid on an instrument so far [its currency].
+    #[must_use]
+    pub fn fees(&self, instrument: usize) -> f64 {
+        self.ledger.positions().get(instrument).map_or(0.0, |position| position.fees.to_f64())
+    }
+
+    /// What is held of an instrument would gain if it were closed at its mark, before fees [its currency].
+    #[inline]
+    #[must_use]
+    pub fn unrealized(&self, instrument: usize) -> f64 {
+        let gain = |position: &Position| position.value().to_f64() - position.basis.to_f64();
+        self.ledger.positions().get(instrument).map_or(0.0, gain)
     }
 
     /// What is under way of an instrument and would change the position: positive for buys. Orders that only close what is

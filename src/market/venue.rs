@@ -194,6 +194,12 @@ impl Floor {
         self.sweep(at);
     }
 
+    /// Before the first message: the book is there already.
+    pub fn begin_with_book(&mut self, book: DepthBook, others: Others) {
+        self.shown = shown::Shown::Depth(Box::new(book));
+        self.others = others;
+    }
+
     /// The next fill of an order is to be another.
     pub fn fill_instead(&mut self, id: super::OrderId, instead: AnotherFill) {
         self.instead.retain(|(other, _)| *other != id);

@@ -1,12 +1,14 @@
 //! `cart_pole`: a cart on a track, and a pole that swings freely on it.
 
+use super::cart_pole_lane::Lane;
 use super::estimate::{local, motion, rounding, typical};
-use super::joint::{Axis, CREEP_RATE, CREEP_SHARE};
+use super::joint::Axis;
 use super::mover::{Motion, Mover, Push};
 use super::runge_kutta::{Contact, step_with_friction};
 use super::signal::{Commands, Signal};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
+    Typical,
 };
 
 /// A cart of mass `M` at `x`, driven by `gain u`, with a uniform pole of mass `m` and half length `l` hinged on it, at the
@@ -28,6 +30,21 @@ use crate::sim2real::{
 #[derive(Debug, Clone, PartialEq)]
 pub struct CartPole {
     parameters: Vec<Parameter>,
+    integration: Integration,
+}
+
+/// How a cart-pole is integrated.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Integration {
+    /// By classical Runge-Kutta, at 1 ms and finer.
+    #[default]
+    RungeKutta,
+    /// By Euler's explicit method, in steps of `step` [s]: as Gymnasium has it, whose step of 0.02 s is a part of the task. Dry
+    /// friction stops the cart within a step, as the joint's does.
+    Euler {
+        /// Length of a step [s].
+        step: f64,
+    },
 }
 
 /// The parameters of a cart-pole in their order: name and unit.
@@ -86,7 +103,14 @@ impl CartPole {
                 }
             })
             .collect();
-        Self { parameters }
+        Self { parameters, integration: Integration::default() }
+    }
+
+    /// The same, integrated in another way.
+    #[must_use]
+    pub fn integrated(mut self, integration: Integration) -> Self {
+        self.integration = integration;
+        self
     }
 
     /// The names and units of its parameters, in the order of [`CartPole::new`].
@@ -110,7 +134,10 @@ impl Plant for CartPole {
     }
 
     fn clock(&self) -> Clock {
-        Clock::Sampled { longest_step: LONGEST_STEP }
+        match self.integration {
+            Integration::RungeKutta => Clock::Sampled { longest_step: LONGEST_STEP },
+            Integration::Euler { step } => Clock::Sampled { longest_step: step },
+        }
     }
 
     fn channels(&self) -> &[Channel] {
@@ -161,7 +188,8 @@ impl Plant for CartPole {
 
     fn dynamics(&self, thetas: &Thetas) -> CartPoleDynamics {
         let values = |lane: usize| std::array::from_fn(|k| thetas.row(k)[lane]);
-        CartPoleDynamics { lanes: (0..thetas.lanes()).map(|lane| Lane::of(values(lane))).collect() }
+        let lanes = (0..thetas.lanes()).map(|lane| Lane::of(values(lane))).collect();
+        CartPoleDynamics { lanes, integration: self.integration }
     }
 }
 
@@ -169,66 +197,7 @@ impl Plant for CartPole {
 #[derive(Debug, Clone)]
 pub struct CartPoleDynamics {
     lanes: Vec<Lane>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Lane {
-    cart_mass: f64,
-    pole_mass: f64,
-    half_length: f64,
-    gravity: f64,
-    cart_friction: f64,
-    pole_friction: f64,
-    gain: f64,
-}
-
-impl Lane {
-    fn of(values: [f64; 7]) -> Self {
-        let [cart_mass, pole_mass, half_length, gravity, cart_friction, pole_friction, gain] = values;
-        Self { cart_mass, pole_mass, half_length, gravity, cart_friction, pole_friction, gain }
-    }
-
-    /// What the pole weighs along the track while it swings freely: `M + m - 3/4 m cos^2 q` [kg], with a cart of mass `cart`.
-    fn inertia(&self, cart: f64, cos: f64) -> f64 {
-        cart + self.pole_mass * (1.0 - 0.75 * cos * cos)
-    }
-
-    /// Force of the freely swinging pole on a cart that does not accelerate [N].
-    fn reaction(&self, state: &[f64; 4]) -> f64 {
-        let [_, _, angle, spin] = *state;
-        let (sin, cos) = angle.sin_cos();
-        self.pole_mass * self.half_length * spin * spin * sin - 0.75 * cos * self.leaning(sin, spin)
-    }
-
-    /// Torque that turns the pole, over its half length [N].
-    fn leaning(&self, sin: f64, spin: f64) -> f64 {
-        self.pole_mass * self.gravity * sin - self.pole_friction * spin / self.half_length
-    }
-
-    /// Force on the cart beside the pole's and dry friction's [N].
-    fn force(&self, state: &[f64; 4], command: f64, push: &Push) -> f64 {
-        let [position, velocity, ..] = *state;
-        self.gain * command + push.effort - push.stiffness * position - (self.cart_friction + push.damping) * velocity
-    }
-
-    fn rate(&self, state: &[f64; 4], command: f64, push: &Push, contact: Contact) -> [f64; 4] {
-        let [_, velocity, angle, spin] = *state;
-        let (sin, cos) = angle.sin_cos();
-        let acceleration = match contact {
-            Contact::Held => 0.0,
-            Contact::Sliding(friction) => {
-                let inertia = self.inertia(self.cart_mass + push.inertia, cos);
-                let mut force = self.force(state, command, push) + self.reaction(state);
-                if push.creeping_friction > 0.0 {
-                    let stopping = CREEP_SHARE * (inertia * CREEP_RATE * velocity + force);
-                    force -= stopping.max(-push.creeping_friction).min(push.creeping_friction);
-                }
-                (force + friction) / inertia
-            }
-        };
-        let turning = 0.75 / self.half_length * (self.leaning(sin, spin) / self.pole_mass - cos * acceleration);
-        [velocity, acceleration, spin, turning]
-    }
+    integration: Integration,
 }
 
 impl Mover for CartPole {
@@ -254,6 +223,12 @@ impl Mover for CartPole {
     }
 }
 
+impl LaneDynamics<CartPole> for CartPoleDynamics {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.lanes, |values| Lane::of(std::array::from_fn(|k| values[k])));
+    }
+}
+
 impl Dynamics<CartPole> for CartPoleDynamics {
     fn initial(&self, initial: &Thetas) -> Vec<[f64; 4]> {
         (0..initial.lanes()).map(|lane| std::array::from_fn(|k| initial.row(k)[lane])).collect()
@@ -261,9 +236,14 @@ impl Dynamics<CartPole> for CartPoleDynamics {
 
     fn advance(&self, tick: Tick, states: &mut [[f64; 4]], _: &[()], commands: &[Signal], effects: &[Push]) {
         for (((state, command), push), lane) in states.iter_mut().zip(commands).zip(effects).zip(&self.lanes) {
-            let net = |s: &[f64; 4]| lane.force(s, command.0, push) + lane.reaction(s);
-            let rate = |s: &[f64; 4], contact: Contact| lane.rate(s, command.0, push, contact);
-            *state = step_with_friction(*state, tick.step, 1, push.dry_friction, net, rate);
+            *state = match self.integration {
+                Integration::RungeKutta => {
+                    let net = |s: &[f64; 4]| lane.force(s, command.0, push) + lane.reaction(s);
+                    let rate = |s: &[f64; 4], contact: Contact| lane.rate(s, command.0, push, contact);
+                    step_with_friction(*state, tick.step, 1, push.dry_friction, net, rate)
+                }
+                Integration::Euler { .. } => lane.euler(state, tick.step, command.0, push),
+            };
         }
     }
 
@@ -278,7 +258,7 @@ impl Dynamics<CartPole> for CartPoleDynamics {
 mod tests {
     use super::*;
     use crate::robot::CART_POLE_MECHANISMS;
-    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_mechanism, check_plant};
+    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_lanes, check_mechanism, check_plant};
 
     const VALUES: [f64; 7] = [1.0, 0.1, 0.5, 9.8, 0.3, 0.01, 2.0];
 
@@ -303,7 +283,22 @@ mod tests {
         check_plant(&plant(), CART_POLE_MECHANISMS, &hanging(400)).unwrap();
         for mechanism in CART_POLE_MECHANISMS {
             check_mechanism(*mechanism, &plant(), CART_POLE_MECHANISMS, &hanging(800)).unwrap();
+            check_lanes(*mechanism, &plant(), CART_POLE_MECHANISMS, &hanging(800)).unwrap();
         }
+    }
+
+    #[test]
+    fn by_euler_it_keeps_the_contract_too_and_dry_friction_holds_it() {
+        let euler = || plant().integrated(Integration::Euler { step: 0.02 });
+        check_plant(&euler(), CART_POLE_MECHANISMS, &hanging(400)).unwrap();
+        for mechanism in CART_POLE_MECHANISMS {
+            check_lanes(*mechanism, &euler(), CART_POLE_MECHANISMS, &hanging(400)).unwrap();
+        }
+        let hangs = [0.0, 0.0, std::f64::consts::PI, 0.0];
+        let lane = Lane::of(VALUES);
+        let stuck = lane.euler(&hangs, 0.02, 0.4, &Push { dry_friction: 1.0, ..Push::default() });
+        assert_eq!(stuck[..2], [0.0, 0.0]);
+        assert!(lane.euler(&hangs, 0.02, 0.6, &Push { dry_friction: 1.0, ..Push::default() })[1] > 0.0);
     }
 
     /// The accelerations of Gymnasium's `CartPoleEnv.step`, line by line; without friction, as there.

@@ -5,7 +5,8 @@ use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
 use super::sine::{sine, sines};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
+    Typical,
 };
 
 /// `inertia a + viscous_friction v + gravity_torque sin(q) = gain u`.
@@ -83,6 +84,13 @@ pub(super) const CREEP_RATE: f64 = 105.0;
 /// What is seen of a joint: position [rad], velocity [rad/s].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Posture([f64; 2]);
+
+impl Posture {
+    /// That of a motion.
+    pub(super) const fn of(motion: &Motion) -> Self {
+        Self([motion.position, motion.velocity])
+    }
+}
 
 impl AsMut<[f64]> for Posture {
     fn as_mut(&mut self) -> &mut [f64] {
@@ -273,6 +281,17 @@ impl Lane {
     }
 }
 
+impl LaneDynamics<Joint> for JointDynamics {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.lanes, |values| Lane {
+            inertia: values[0],
+            viscous_friction: values[1],
+            gravity_torque: values[2],
+            gain: values[3],
+        });
+    }
+}
+
 impl Dynamics<Joint> for JointDynamics {
     fn initial(&self, initial: &Thetas) -> Vec<Motion> {
         let lanes = initial.row(0).iter().zip(initial.row(1));
@@ -302,7 +321,7 @@ impl Dynamics<Joint> for JointDynamics {
 
     fn observe(&self, states: &[Motion], observations: &mut [Posture]) {
         for (state, observation) in states.iter().zip(observations) {
-            observation.0 = [state.position, state.velocity];
+            *observation = Posture::of(state);
         }
     }
 }

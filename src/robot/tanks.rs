@@ -4,7 +4,8 @@ use super::estimate::{local, motion, rounding, typical};
 use super::runge_kutta::step;
 use super::signal::{Commands, Signal};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
+    Typical,
 };
 
 /// Levels of the two tanks, in the unit of the lower tank's sensor:
@@ -175,6 +176,12 @@ pub struct TanksDynamics {
     lanes: Vec<[f64; 4]>,
 }
 
+impl LaneDynamics<Tanks> for TanksDynamics {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.lanes, |values| std::array::from_fn(|k| values[k]));
+    }
+}
+
 impl Dynamics<Tanks> for TanksDynamics {
     fn initial(&self, initial: &Thetas) -> Vec<Levels> {
         initial.row(0).iter().zip(initial.row(1)).map(|(upper, lower)| [*upper, *lower]).collect()
@@ -221,7 +228,7 @@ fn flow(levels: Levels, seconds: f64, pumped: f64, rims: &Rims, parameters: &[f6
 mod tests {
     use super::*;
     use crate::robot::TANKS_MECHANISMS;
-    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_mechanism, check_plant};
+    use crate::sim2real::{Assembly, Measured, Seed, Simulator, check_lanes, check_mechanism, check_plant};
 
     const VALUES: [f64; 4] = [0.05, 0.045, 0.055, 0.04];
 
@@ -252,6 +259,7 @@ mod tests {
         recording.stimulus.0.iter_mut().skip(300).for_each(|u| *u = -*u);
         for mechanism in TANKS_MECHANISMS {
             check_mechanism(*mechanism, &tanks(), TANKS_MECHANISMS, &recording).unwrap();
+            check_lanes(*mechanism, &tanks(), TANKS_MECHANISMS, &recording).unwrap();
         }
     }
 

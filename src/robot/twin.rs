@@ -91,7 +91,7 @@ fn parameter(twin: &TwinFile, wanted: &Wanted) -> Result<Quantity, InputError> {
 }
 
 /// The plant with the mechanisms that the twin lists.
-fn assembly<P: Plant>(twin: &TwinFile, plant: P, registry: Registry<P>) -> Result<Assembly<P>, InputError>
+pub(super) fn assembly<P: Plant>(twin: &TwinFile, plant: P, registry: Registry<P>) -> Result<Assembly<P>, InputError>
 where
     P::Command: AsMut<f64>,
 {

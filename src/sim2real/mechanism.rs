@@ -28,7 +28,7 @@ use std::fmt;
 use dyn_clone::DynClone;
 use serde::{Deserialize, Serialize};
 
-use super::{Parameter, Plant, Seed, Thetas, Tick, Typical};
+use super::{LaneChange, Parameter, Plant, Seed, Thetas, Tick, Ticks, Typical};
 
 pub use actuator_lag::ActuatorLag;
 pub use bias::Bias;
@@ -190,6 +190,9 @@ pub struct Scene<'a, P: Plant> {
 /// The running part of a mechanism over all lanes, and the owner of its memory. It acts through one of its methods.
 ///
 /// A copy goes on from the same memory by itself: so a run can be forked.
+///
+/// The lanes of an environment are runs of their own, each with its own clock, draws and beginnings: there the methods that end in
+/// `_each` are called, and [`change`](Law::change). What a lane does there depends on its own past alone.
 pub trait Law<P: Plant>: DynClone + Send {
     /// Shapes the commands on their way to the plant, one a lane.
     fn shape(&mut self, _tick: Tick, _commands: &mut [P::Command]) {}
@@ -197,6 +200,26 @@ pub trait Law<P: Plant>: DynClone + Send {
     fn act(&mut self, _tick: Tick, _scene: &Scene<'_, P>, _effects: &mut [P::Effect]) {}
     /// Distorts the observations on their way back, one a lane.
     fn sense(&mut self, _time: f64, _observations: &mut [P::Observation]) {}
+    /// As [`shape`](Law::shape), where every lane has its own clock. Laws to which more matters than the length of a tick have their
+    /// own, as for the other two.
+    fn shape_each(&mut self, ticks: Ticks<'_>, commands: &mut [P::Command]) {
+        self.shape(ticks.lane(0), commands);
+    }
+    /// As [`act`](Law::act), where every lane has its own clock.
+    fn act_each(&mut self, ticks: Ticks<'_>, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.act(ticks.lane(0), scene, effects);
+    }
+    /// As [`sense`](Law::sense), where every lane has its own clock, and draws of its own.
+    fn sense_each(&mut self, times: &[f64], observations: &mut [P::Observation]) {
+        self.sense(times.first().copied().unwrap_or_default(), observations);
+    }
+    /// Changes one lane: shows `change` all that is kept by lanes. Laws of plants that no environment steps, as those of a market,
+    /// need none.
+    fn change(&mut self, _change: &LaneChange<'_>) {}
+    /// A quantity of its own that a sensor may show, in lane `lane`, such as the heat of a winding; none where it has none.
+    fn told(&self, _lane: usize) -> Option<f64> {
+        None
+    }
 }
 
 dyn_clone::clone_trait_object!(<P: Plant> Law<P>);

@@ -7,10 +7,13 @@
 
 mod assembly;
 mod check;
+mod check_lanes;
 mod controller;
 pub mod diagnose;
 mod follow;
 pub mod identify;
+mod lane;
+mod lane_run;
 pub mod mechanism;
 mod parameter;
 mod plant;
@@ -25,7 +28,10 @@ mod time;
 
 pub use assembly::{Assembly, Registry};
 pub use check::{Violation, check_mechanism, check_plant};
+pub use check_lanes::check_lanes;
 pub use controller::{Controller, DerivativeOf, Feedback, Pid};
+pub use lane::{Counter, LaneChange, LaneDraws, LaneImage};
+pub use lane_run::{LaneDynamics, LaneRun, LoopIsClosed};
 pub use mechanism::{About, Form, Law, Mechanism, Scene, Signs, Site};
 pub use parameter::{Parameter, Thetas};
 pub use plant::{Channel, Clock, Command, Covariate, DelayLine, Dynamics, Observation, Plant, Stimulus, Typical};
@@ -34,4 +40,4 @@ pub use residual::ChannelWeight;
 pub use run::Run;
 pub use seed::{Draws, Seed};
 pub use simulator::{Candidate, Simulator, Twin};
-pub use time::{NotAnInstant, Tick, Timestamp, written_instant};
+pub use time::{NotAnInstant, Tick, Ticks, Timestamp, written_instant};

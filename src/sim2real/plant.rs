@@ -35,7 +35,7 @@ impl Clock {
 /// What is sent to a plant.
 pub trait Command: Clone + Send + Sync + 'static {
     /// How a delay acts on it: a signal that holds needs a line of its past, a message only a later arrival.
-    type Line: DelayLine<Self>;
+    type Line: DelayLine<Self> + 'static;
 }
 
 /// The memory of a delay, for one lane.

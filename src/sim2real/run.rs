@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Dynamics, Feedback, Law, Plant, Scene, Tick};
+use super::{Dynamics, Feedback, Law, Plant, Scene, Tick, Ticks};
 
 /// A running assembly: all lanes, one step at a time.
 pub struct Run<P: Plant> {
@@ -115,6 +115,17 @@ impl<P: Plant> Run<P> {
             seen(k, &self.effects);
         }
         self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
+    }
+
+    /// As [`advance`](Self::advance), where every lane has its own clock and the inputs are there.
+    pub(super) fn advance_each(&mut self, ticks: Ticks<'_>) {
+        self.effects.fill(P::Effect::default());
+        for law in &mut self.plant_laws {
+            let scene =
+                Scene { dynamics: &self.dynamics, states: &self.states, inputs: &self.inputs, commands: &self.commands };
+            law.act_each(ticks, &scene, &mut self.effects);
+        }
+        self.dynamics.advance(ticks.lane(0), &mut self.states, &self.inputs, &self.commands, &self.effects);
     }
 
     /// What is reported of every lane at `time` [s].

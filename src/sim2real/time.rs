@@ -19,6 +19,23 @@ pub struct Tick {
     pub step: f64,
 }
 
+/// One step of many runs whose clocks are apart: all are equally long, and each lane has a time of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ticks<'a> {
+    /// Length of each tick [s].
+    pub step: f64,
+    /// Start of the tick [s], one a lane.
+    pub times: &'a [f64],
+}
+
+impl Ticks<'_> {
+    /// That of lane `lane`; the time is 0 where there is no such lane.
+    #[must_use]
+    pub fn lane(&self, lane: usize) -> Tick {
+        Tick { index: 0, time: self.times.get(lane).copied().unwrap_or_default(), step: self.step }
+    }
+}
+
 /// An instant [ns since the Unix epoch, UTC].
 ///
 /// Nanoseconds in 64 bits reach from 1677 to 2262.

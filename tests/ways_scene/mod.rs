@@ -23,7 +23,7 @@ fn streams_of(history: &History, at_a_time: usize) -> Sources {
     }
 }
 
-fn to_the_end(mut session: Session<'_>, strategy: &mut dyn Strategy) -> Record {
+fn to_the_end(mut session: Session, strategy: &mut dyn Strategy) -> Record {
     while session.step(strategy).unwrap().is_some() {}
     session.finish().unwrap()
 }

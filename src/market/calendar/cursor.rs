@@ -1,5 +1,7 @@
 //! A calendar asked at every event: it remembers until when its last answer holds.
 
+use std::sync::Arc;
+
 use crate::sim2real::Timestamp;
 
 use super::{Calendar, Hours};
@@ -9,8 +11,8 @@ use super::{Calendar, Hours};
 /// As long as these stay between an open and a close, or a close and an open, an answer is two comparisons. Times may go
 /// back: answers never depend on what was asked before.
 #[derive(Debug, Clone)]
-pub struct Trading<'c> {
-    calendar: &'c Calendar,
+pub struct Trading {
+    calendar: Arc<Calendar>,
     /// Answers hold from here,
     from: Timestamp,
     /// to before here.
@@ -20,10 +22,10 @@ pub struct Trading<'c> {
     previous_close: Option<Timestamp>,
 }
 
-impl<'c> Trading<'c> {
+impl Trading {
     /// A place in `calendar`.
     #[must_use]
-    pub fn new(calendar: &'c Calendar) -> Self {
+    pub fn new(calendar: Arc<Calendar>) -> Self {
         // Nothing is known yet: no time is from the last instant to before the first.
         let (from, until) = (Timestamp::MAX, Timestamp::MIN);
         Self { calendar, from, until, session: None, next: None, previous_close: None }
@@ -65,8 +67,8 @@ impl<'c> Trading<'c> {
 
     /// The calendar.
     #[must_use]
-    pub fn calendar(&self) -> &'c Calendar {
-        self.calendar
+    pub fn calendar(&self) -> &Calendar {
+        &self.calendar
     }
 
     #[inline]

@@ -1,5 +1,7 @@
 //! Sessions around opens, closes and changes of clocks; what is refused; and the cursor against the calendar.
 
+use std::sync::Arc;
+
 use chrono::{DateTime, NaiveDate};
 use proptest::prelude::*;
 
@@ -175,7 +177,7 @@ fn a_market_that_ended_never_opens_again() {
     assert_eq!(calendar.previous_close(at("2200-01-01T00:00:00Z")), Some(at("2001-01-01T10:00:00Z")));
     assert_eq!(calendar.previous_close(at("1999-01-01T00:00:00Z")), None);
     assert_eq!(calendar.next_session(Timestamp::MIN).unwrap().date, date(2000, 1, 3));
-    let mut trading = Trading::new(&calendar);
+    let mut trading = Trading::new(Arc::new(calendar.clone()));
     for time in [Timestamp::MAX, Timestamp::MIN, at("2000-01-03T09:30:00Z"), Timestamp::MAX] {
         assert_eq!(trading.session_at(time), calendar.session_at(time));
         assert_eq!(trading.next_session(time), calendar.next_session(time));
@@ -262,7 +264,7 @@ proptest! {
     #[test]
     fn the_cursor_agrees_with_the_calendar(times in times(), name in prop::sample::select(vec!["nyse", "cme_globex", "always"])) {
         let calendar = built_in(name);
-        let mut trading = Trading::new(&calendar);
+        let mut trading = Trading::new(Arc::new(calendar.clone()));
         for time in times {
             // The instants around each open and close as well.
             let (session, next) = (calendar.session_at(time), calendar.next_session(time));

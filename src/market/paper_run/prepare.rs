@@ -156,7 +156,7 @@ impl PreparedPaper {
         Ok(PaperSession::new(session, strategy, self.settings.clone(), &self.run, Arc::clone(&self.log)))
     }
 
-    fn session(&self) -> Result<Session<'_>, BacktestError> {
+    fn session(&self) -> Result<Session, BacktestError> {
         let data = |error: InputError| BacktestError::Data(Box::new(StreamError::Input(error)));
         let sources = match &self.lines {
             Some(lines) => sources(&self.run, lines).map_err(data)?,

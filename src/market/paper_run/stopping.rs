@@ -2,7 +2,7 @@
 
 use crate::market::{BacktestError, Cash, Quantity, Reason, Session, Status};
 
-impl Session<'_> {
+impl Session {
     /// Takes all orders back that work or are on their way, at the exchange and at once, as a broker does for whom a connection is
     /// lost.
     ///

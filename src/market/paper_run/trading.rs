@@ -12,7 +12,7 @@ use super::paper_log::{PaperLog, Replayed};
 
 /// A paper run under way: the session of a backtest that goes as far as it is told, with all it does in the journal.
 pub struct PaperSession<'p> {
-    session: Session<'p>,
+    session: Session,
     strategy: Limited,
     run: &'p RunFile,
     log: Arc<Mutex<PaperLog>>,
@@ -49,7 +49,7 @@ impl std::fmt::Debug for PaperSession<'_> {
 
 impl<'p> PaperSession<'p> {
     pub(super) fn new(
-        session: Session<'p>,
+        session: Session,
         strategy: Box<dyn Strategy>,
         settings: PaperSettings,
         run: &'p RunFile,
@@ -166,10 +166,10 @@ impl<'p> PaperSession<'p> {
         }
         self.tell()?;
         let (mut told, run, log) = (self.told, self.run, Arc::clone(&self.log));
-        let (events, instruments) = (self.session.events(), self.session.setup.instruments());
+        let (events, setup) = (self.session.events(), Arc::clone(&self.session.setup));
         let record = self.session.finish().map_err(|error| explained(run, &error))?;
         let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
-        log.outcome(told.news(&record.blotter, instruments, events))?;
+        log.outcome(told.news(&record.blotter, setup.instruments(), events))?;
         log.all_done()?;
         log.sync()?;
         Ok(record)

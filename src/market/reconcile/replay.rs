@@ -66,7 +66,7 @@ pub enum ReplayError {
 ///
 /// # Errors
 /// What fails in the run; sums beyond 128 bits.
-pub fn replay(mut session: Session<'_>, symbols: &[&str], orders: &[Life]) -> Result<Replay, ReplayError> {
+pub fn replay(mut session: Session, symbols: &[&str], orders: &[Life]) -> Result<Replay, ReplayError> {
     let mut why_not: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     let mut left_out = |place: usize, why: String| {
         let own = why_not.entry(why).or_insert((0, place));

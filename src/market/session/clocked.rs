@@ -5,7 +5,7 @@ use crate::sim2real::Timestamp;
 
 use super::Session;
 
-impl Session<'_> {
+impl Session {
     /// When the next thing happens: a row of data, or a message that is due; none when the data have ended.
     #[must_use]
     pub fn next_due(&self) -> Option<Timestamp> {

@@ -6,7 +6,7 @@ use crate::market::{Arrival, BacktestError, Event, EventKind};
 
 use super::Session;
 
-impl Session<'_> {
+impl Session {
     /// Something happens at the exchange: orders that wait there meet it.
     #[inline(always)]
     pub(super) fn happen(&mut self, arrival: &Arrival) -> Result<(), BacktestError> {

@@ -3,12 +3,14 @@
 //! Nearly all of a backtest on bars is that. Nothing happens there but that a bar becomes known and the strategy decides; so
 //! what [`Session::step`] looks for at each event is looked for once.
 
+use std::sync::Arc;
+
 use crate::market::{BacktestError, Strategy};
 use crate::sim2real::Timestamp;
 
 use super::Session;
 
-impl Session<'_> {
+impl Session {
     /// Lets at least one event happen and about `events` at most, as [`Session::step`] does one by one; whether there are more.
     ///
     /// # Errors
@@ -39,11 +41,12 @@ impl Session<'_> {
     /// Shows the strategy the bars of a quiet stretch, up to the first after which something is due.
     #[inline]
     fn pass_quiet_bars(&mut self, strategy: &mut dyn Strategy, last: usize) -> Result<(), BacktestError> {
-        let Some((instrument, bars, others)) = self.feed.bars_alone() else { return Ok(()) };
+        let Some((instrument, bars, next, others)) = self.feed.bars_alone() else { return Ok(()) };
         let floor = &self.venue.floors[instrument];
         if !floor.is_idle() || !floor.is_quiet() {
             return Ok(());
         }
+        let bars = Arc::clone(bars);
         let due = self.agenda.peek().map_or(Timestamp::MAX, |(at, _)| at);
         let shown = self.transit.peek().unwrap_or(Timestamp::MAX);
         // What is held is charged at the first event of a day.
@@ -51,7 +54,7 @@ impl Session<'_> {
         let (end, most) = (others.min(due).min(shown).min(day), last.saturating_sub(self.held.events));
         let mut passed = 0;
         let mut asked = Ok(false);
-        for bar in bars.iter().take(most).take_while(|bar| bar.known_at < end) {
+        for bar in bars[next..].iter().take(most).take_while(|bar| bar.known_at < end) {
             passed += 1;
             asked = self.show_bar(instrument, bar, strategy);
             if !matches!(asked, Ok(false)) {

@@ -5,7 +5,7 @@ use crate::sim2real::Timestamp;
 
 use super::Session;
 
-impl Session<'_> {
+impl Session {
     /// Shows the strategy what became known, and sends what it asks for.
     #[inline(always)]
     pub(super) fn show(&mut self, arrival: &Arrival, strategy: &mut dyn Strategy) -> Result<Event, BacktestError> {

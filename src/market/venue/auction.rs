@@ -78,7 +78,7 @@ pub(in crate::market) struct Auctions {
 
 impl Auctions {
     /// Those of a floor with such data, whose market is closed yet.
-    pub fn of(line: &Line<'_>) -> Self {
+    pub fn of(line: &Line) -> Self {
         let displayed = [RowKind::Quotes, RowKind::Depth, RowKind::Orders].iter().any(|kind| line.tells(*kind));
         let told = match (displayed, line.tells(RowKind::Trades)) {
             (true, false) => Told::Displayed,
@@ -89,7 +89,7 @@ impl Auctions {
     }
 
     /// Those of a floor without hours, which is open but for halts.
-    pub fn always(line: &Line<'_>) -> Self {
+    pub fn always(line: &Line) -> Self {
         Self { doors: Doors::Open, ..Self::of(line) }
     }
 

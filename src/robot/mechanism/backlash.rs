@@ -3,7 +3,7 @@
 use super::second_mass::{Coupling, Load, SecondMass, as_one};
 use super::spring::Wall;
 use crate::robot::{Motion, Mover};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// In the form `play`, what arrives of a command follows it at half of `width`: a command that turns round has no effect
 /// until it has come back by `width`.
@@ -77,7 +77,8 @@ where
         }
         let friction = if form == 2 { thetas.row(2).to_vec() } else { vec![0.0; thetas.lanes()] };
         let spring = (form == 3).then(|| (thetas.row(2).to_vec(), thetas.row(3).to_vec()));
-        Box::new(Gap { gap: row, share: thetas.row(1).to_vec(), friction, spring, motor: vec![None; thetas.lanes()] })
+        let motor = vec![None; thetas.lanes()];
+        Box::new(Gap { gap: row, share: thetas.row(1).to_vec(), rubs: form == 2, friction, spring, motor })
     }
 }
 
@@ -91,6 +92,11 @@ impl<P: Mover> Law<P> for Play
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.width);
+        change.memory(&mut self.follower);
+    }
+
     fn shape(&mut self, _: Tick, commands: &mut [P::Command]) {
         for ((command, width), follower) in commands.iter_mut().zip(&self.width).zip(&mut self.follower) {
             let u = command.as_mut();
@@ -107,6 +113,8 @@ where
 struct Gap {
     gap: Vec<f64>,
     share: Vec<f64>,
+    /// Whether the third parameter is the motor's friction.
+    rubs: bool,
     friction: Vec<f64>,
     /// Stiffness and damping ratio of the touch, where it gives.
     spring: Option<(Vec<f64>, Vec<f64>)>,
@@ -114,6 +122,19 @@ struct Gap {
 }
 
 impl<P: Mover> Law<P> for Gap {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.gap);
+        change.parameter(1, &mut self.share);
+        if self.rubs {
+            change.parameter(2, &mut self.friction);
+        }
+        if let Some((stiffness, ratio)) = &mut self.spring {
+            change.parameter(2, stiffness);
+            change.parameter(3, ratio);
+        }
+        change.memory(&mut self.motor);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let parameters = self.gap.iter().zip(&self.share).zip(&self.friction).zip(&mut self.motor);
         let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();
@@ -215,7 +236,8 @@ mod tests {
     /// What is shared in contacts is shared by the masses: no momentum is lost or made.
     #[test]
     fn momentum_is_that_of_the_drive() {
-        let mut law = Gap { gap: vec![0.03], share: vec![0.4], friction: vec![0.0], spring: None, motor: vec![None] };
+        let (gap, share, friction) = (vec![0.03], vec![0.4], vec![0.0]);
+        let mut law = Gap { gap, share, rubs: false, friction, spring: None, motor: vec![None] };
         let (inertia, step) = (0.1, 1e-3);
         let joint = Joint::new(crate::robot::Axis::Rotary, TRIAL.parameters, [0.0; 4]);
         let dynamics = crate::sim2real::Plant::dynamics(&joint, &Thetas::single(&TRIAL.parameters));

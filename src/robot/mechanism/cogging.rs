@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `sine sin(counts q) + cosine cos(counts q)`; in the form `per_length`, of a linear axis, with `wave_number` for
 /// `counts`.
@@ -69,6 +69,12 @@ struct Teeth {
 }
 
 impl<P: Mover> Law<P> for Teeth {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.sine);
+        change.parameter(1, &mut self.cosine);
+        change.parameter(2, &mut self.number);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let parameters = self.sine.iter().zip(&self.cosine).zip(&self.number);
         for ((effect, state), ((sine, cosine), number)) in effects.iter_mut().zip(scene.states).zip(parameters) {

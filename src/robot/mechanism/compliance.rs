@@ -3,7 +3,7 @@
 use super::second_mass::{Coupling, Load, SecondMass, as_one};
 use super::spring::spring_inertia;
 use crate::robot::{Motion, Mover};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// Motor and link, held together by a spring that gives by `compliance` and by a damper of `damping_ratio` times the
 /// critical damping of the two against each other. The motor is driven and has the joint's viscous friction, gravity pulls
@@ -89,6 +89,14 @@ struct Sides {
 }
 
 impl Shaft {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.compliance);
+        change.parameter(1, &mut self.share);
+        change.parameter(2, &mut self.damping_ratio);
+        change.derived(&mut self.hardening_twist, |values| values.get(3).copied().unwrap_or(f64::INFINITY));
+        change.memory(&mut self.second);
+    }
+
     /// One step of all lanes; `sides` says for a lane and its state where the mass without an encoder is in the middle of
     /// the step what acts on which mass, `at_rest` what acts on the first and the second were they one.
     fn turn<P: Mover>(
@@ -153,6 +161,10 @@ fn twist(linear: f64, doubling: f64) -> f64 {
 struct OnMotor(Shaft);
 
 impl<P: Mover> Law<P> for OnMotor {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change(change);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let sides = |lane, state: &P::State, link: f64| {
             let motor = P::motion(state);
@@ -174,6 +186,10 @@ impl<P: Mover> Law<P> for OnMotor {
 struct OnLink(Shaft);
 
 impl<P: Mover> Law<P> for OnLink {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change(change);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let drive = |lane, state: &P::State| P::drive(scene.dynamics, lane, state, &scene.commands[lane]);
         let sides = |lane, state: &P::State, _| {

@@ -1,7 +1,7 @@
 //! A load that never goes away: a tilted axis, a spring balancer, a cable's pull.
 
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `torque += torque_0`.
 ///
@@ -36,6 +36,10 @@ impl<P: Mover> Mechanism<P> for ConstantLoad {
 struct Load(Vec<f64>);
 
 impl<P: Mover> Law<P> for Load {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
         effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| P::push(effect).effort += torque);
     }

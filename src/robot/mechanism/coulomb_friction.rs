@@ -2,7 +2,7 @@
 
 use super::Hysteresis;
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-torque sign(v)` in motion; at rest, whatever holds the joint, up to `torque`.
 ///
@@ -83,6 +83,10 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
 struct Dry(Vec<f64>);
 
 impl<P: Mover> Law<P> for Dry {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
         effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| P::push(effect).dry_friction += torque);
     }
@@ -92,6 +96,10 @@ impl<P: Mover> Law<P> for Dry {
 struct Creeping(Vec<f64>);
 
 impl<P: Mover> Law<P> for Creeping {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
         effects.iter_mut().zip(&self.0).for_each(|(effect, torque)| P::push(effect).creeping_friction += torque);
     }
@@ -104,6 +112,11 @@ struct Smooth {
 }
 
 impl<P: Mover> Law<P> for Smooth {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.torque);
+        change.parameter(1, &mut self.velocity);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let parameters = self.torque.iter().zip(&self.velocity);
         let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();

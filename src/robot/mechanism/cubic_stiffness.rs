@@ -1,7 +1,7 @@
 //! A spring that gets harder: a bellows, a rubber bush, a cable near its end.
 
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-rate q^3`.
 ///
@@ -38,6 +38,10 @@ impl<P: Mover> Mechanism<P> for CubicStiffness {
 struct Spring(Vec<f64>);
 
 impl<P: Mover> Law<P> for Spring {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         for ((effect, state), rate) in effects.iter_mut().zip(scene.states).zip(&self.0) {
             let motion = P::motion(state);

@@ -2,7 +2,7 @@
 
 use super::spring::Wall;
 use crate::robot::{Mover, Push};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// Part of the range of a motion that may lie beyond a stop.
 const REACH: f64 = 0.35;
@@ -73,12 +73,15 @@ impl<P: Mover> Mechanism<P> for EndStop {
             _ => (thetas.row(0).to_vec(), thetas.row(1).to_vec()),
         };
         let at = if form == 2 { 2 } else { 1 };
-        Box::new(Stops { lower, upper, stiffness: thetas.row(at).to_vec(), damping_ratio: thetas.row(at + 1).to_vec() })
+        let [stiffness, damping_ratio] = [at, at + 1].map(|k| thetas.row(k).to_vec());
+        Box::new(Stops { form, lower, upper, stiffness, damping_ratio })
     }
 }
 
 #[derive(Clone)]
 struct Stops {
+    /// Of the lower end alone where it is 1, of the upper alone where it is 0.
+    form: usize,
     lower: Vec<f64>,
     upper: Vec<f64>,
     stiffness: Vec<f64>,
@@ -86,6 +89,19 @@ struct Stops {
 }
 
 impl<P: Mover> Law<P> for Stops {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        let form = self.form;
+        change.derived(&mut self.lower, |values| if form == 0 { f64::NEG_INFINITY } else { values[0] });
+        change.derived(&mut self.upper, |values| match form {
+            0 => values[0],
+            1 => f64::INFINITY,
+            _ => values[1],
+        });
+        let at = if form == 2 { 2 } else { 1 };
+        change.parameter(at, &mut self.stiffness);
+        change.parameter(at + 1, &mut self.damping_ratio);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let limits = self.lower.iter().zip(&self.upper);
         for (lane, ((effect, state), (lower, upper))) in effects.iter_mut().zip(scene.states).zip(limits).enumerate() {

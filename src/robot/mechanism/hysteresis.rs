@@ -2,7 +2,7 @@
 
 use super::coulomb_friction::PRESLIDING;
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-torque w` with `w' = (v - sigma |v| |w|^(n-1) w + (sigma - 1) v |w|^n) / yield_angle`, `sigma = 1/2`: elastic while it
 /// comes back, and yielding at a level of `torque` after about `yield_angle`; `n = 1` in the form `soft`, `n = 2`, with a sharper
@@ -77,6 +77,12 @@ struct Loops {
 }
 
 impl Loops {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.torque);
+        change.parameter(1, &mut self.angle);
+        change.memory(&mut self.memory);
+    }
+
     /// `drawn` gives the level after loading from a level of at least 0 by a way in units of the yield angle.
     fn pull<P: Mover>(
         &mut self,
@@ -116,6 +122,10 @@ fn moved(level: f64, way: f64, loaded: impl Fn(f64, f64) -> f64) -> f64 {
 struct Soft(Loops);
 
 impl<P: Mover> Law<P> for Soft {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change(change);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         // dw = (1 - w) dx, exactly.
         self.0.pull(tick, scene, effects, |level, way| 1.0 - (1.0 - level) * (-way).exp());
@@ -134,6 +144,10 @@ fn sharp(level: f64, way: f64) -> f64 {
 }
 
 impl<P: Mover> Law<P> for Sharp {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change(change);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         self.0.pull(tick, scene, effects, sharp);
     }

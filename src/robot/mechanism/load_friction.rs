@@ -2,7 +2,7 @@
 
 use super::stribeck_friction::falling;
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// Dry friction of `torque + load |drive - external|`, where `drive` is the motor's effort and `external` that of gravity;
 /// in the form `stribeck`, `torque + load |drive - external| + exp(-(v / stribeck_velocity)^2) (excess + load_excess |drive -
@@ -63,7 +63,7 @@ impl<P: Mover> Mechanism<P> for LoadFriction {
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let row = |k| thetas.row(k).to_vec();
         match form {
-            0 => Box::new(Gears { torque: row(0), motor: row(1), external: row(1) }),
+            0 => Box::new(OneShare(Gears { torque: row(0), motor: row(1), external: row(1) })),
             1 => Box::new(StribeckGears {
                 sliding: Gears { torque: row(0), motor: row(1), external: row(1) },
                 sticking: Gears { torque: row(2), motor: row(3), external: row(3) },
@@ -82,6 +82,13 @@ struct Gears {
 }
 
 impl Gears {
+    /// Changes a lane, whose torque, motor's and external share are the parameters of these numbers.
+    fn change_of(&mut self, change: &LaneChange<'_>, [torque, motor, external]: [usize; 3]) {
+        change.parameter(torque, &mut self.torque);
+        change.parameter(motor, &mut self.motor);
+        change.parameter(external, &mut self.external);
+    }
+
     /// Friction in lane `lane` under these efforts of motor and gravity [N m].
     #[inline]
     fn friction(&self, lane: usize, drive: f64, external: f64) -> f64 {
@@ -99,11 +106,29 @@ fn efforts<P: Mover>(tick: Tick, scene: &Scene<'_, P>, lane: usize, state: &P::S
 }
 
 impl<P: Mover> Law<P> for Gears {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.change_of(change, [0, 1, 2]);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         for (lane, (effect, state)) in effects.iter_mut().zip(scene.states).enumerate() {
             let (drive, external) = efforts(tick, scene, lane, state);
             P::push(effect).dry_friction += self.friction(lane, drive, external);
         }
+    }
+}
+
+/// Gears with one share for motor and gravity.
+#[derive(Clone)]
+struct OneShare(Gears);
+
+impl<P: Mover> Law<P> for OneShare {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change_of(change, [0, 1, 1]);
+    }
+
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.0.act(tick, scene, effects);
     }
 }
 
@@ -115,6 +140,12 @@ struct StribeckGears {
 }
 
 impl<P: Mover> Law<P> for StribeckGears {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.sliding.change_of(change, [0, 1, 1]);
+        self.sticking.change_of(change, [2, 3, 3]);
+        change.parameter(4, &mut self.velocity);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         for (lane, (effect, state)) in effects.iter_mut().zip(scene.states).enumerate() {
             let (drive, external) = efforts(tick, scene, lane, state);

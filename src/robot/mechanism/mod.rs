@@ -34,7 +34,7 @@ pub use quadratic_drag::QuadraticDrag;
 pub use stiffness::Stiffness;
 pub use stribeck_friction::StribeckFriction;
 
-use super::{CartPole, Equations, Joint, Tanks};
+use super::{CartPole, Equations, Joint, Pendulum, Tanks};
 use crate::sim2real::Registry;
 use crate::sim2real::mechanism::{
     ActuatorLag, Bias, CommandDelay, DeadZone, Drift, Dropout, Eccentricity, GainError, Noise, ObservationDelay,
@@ -97,6 +97,9 @@ pub static MECHANISMS: Registry<Joint> = rows!(motion, delays OF_SERVOS, rates &
 /// The registry of a cart with a pole: mechanisms of motion act on the cart.
 pub static CART_POLE_MECHANISMS: Registry<CartPole> = rows!(motion, delays OF_SERVOS, rates &[(0, 1), (2, 3)]);
 
+/// The registry of a pendulum.
+pub static PENDULUM_MECHANISMS: Registry<Pendulum> = rows!(motion, delays OF_SERVOS, rates &[(0, 1)]);
+
 /// The registry of two tanks: levels are not below 0, and no encoder turns with them.
 pub static TANKS_MECHANISMS: Registry<Tanks> = rows!(signals, delays OF_PROCESSES, rates &[], plant [&Overflow], sensor []);
 
@@ -107,7 +110,7 @@ pub static EQUATIONS_MECHANISMS: Registry<Equations> = rows!(motion, delays OF_A
 mod tests {
     use super::*;
     use crate::robot::{Axis, Commands};
-    use crate::sim2real::{Assembly, Measured, Mechanism, Recording, Seed, Simulator, Thetas, check_mechanism};
+    use crate::sim2real::{Assembly, Measured, Mechanism, Recording, Seed, Simulator, Thetas, check_lanes, check_mechanism};
 
     #[test]
     fn every_row_keeps_the_contract() {
@@ -122,6 +125,7 @@ mod tests {
         let arm = Joint::new(Axis::Rotary, [0.11, 0.25, 2.7, 1.0], [0.2, 0.2, 0.2, 0.0]);
         for mechanism in MECHANISMS {
             check_mechanism(*mechanism, &arm, MECHANISMS, &recording).unwrap();
+            check_lanes(*mechanism, &arm, MECHANISMS, &recording).unwrap();
         }
     }
 

@@ -1,7 +1,7 @@
 //! A tank that is full.
 
 use crate::robot::{Rims, Tanks};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `upper -> min(upper, height)`, and `caught` of what runs over falls into the lower tank; in the form `lower` it is the
 /// lower tank, or its sensor, that is full at `lower_height`; in the form `both`, both are.
@@ -45,23 +45,33 @@ impl Mechanism<Tanks> for Overflow {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Tanks>> {
-        let rims = |lane: usize| {
-            let value = |k: usize| thetas.row(k)[lane];
-            match form {
-                0 => Rims { upper: value(0), caught: value(1), ..Rims::default() },
-                1 => Rims { lower: value(0), ..Rims::default() },
-                _ => Rims { upper: value(0), caught: value(1), lower: value(2) },
-            }
-        };
-        Box::new(Full((0..thetas.lanes()).map(rims).collect()))
+        let rims = |lane: usize| rims(form, |k| thetas.row(k)[lane]);
+        Box::new(Full { form, rims: (0..thetas.lanes()).map(rims).collect() })
+    }
+}
+
+/// The rims of form `form`, whose parameters are `value`.
+fn rims(form: usize, value: impl Fn(usize) -> f64) -> Rims {
+    match form {
+        0 => Rims { upper: value(0), caught: value(1), ..Rims::default() },
+        1 => Rims { lower: value(0), ..Rims::default() },
+        _ => Rims { upper: value(0), caught: value(1), lower: value(2) },
     }
 }
 
 #[derive(Clone)]
-struct Full(Vec<Rims>);
+struct Full {
+    form: usize,
+    rims: Vec<Rims>,
+}
 
 impl Law<Tanks> for Full {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        let form = self.form;
+        change.derived(&mut self.rims, |values| rims(form, |k| values[k]));
+    }
+
     fn act(&mut self, _: Tick, _: &Scene<'_, Tanks>, effects: &mut [Rims]) {
-        effects.copy_from_slice(&self.0);
+        effects.copy_from_slice(&self.rims);
     }
 }

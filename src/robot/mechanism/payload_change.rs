@@ -1,7 +1,7 @@
 //! A load taken up, or put down, while the recording ran.
 
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Ticks, Typical};
 
 /// From `time` on, inertia and gravity are greater by `fraction` of what they were; in the form `apart`, inertia by
 /// `inertia_fraction` and gravity by `gravity_fraction`, as where a rotor's inertia, which nothing weighs, is part of the
@@ -56,6 +56,7 @@ impl<P: Mover> Mechanism<P> for PayloadChange {
             time: thetas.row(0).to_vec(),
             inertia: thetas.row(1).to_vec(),
             gravity: thetas.row(last).to_vec(),
+            last,
         })
     }
 }
@@ -65,29 +66,45 @@ struct Payload {
     time: Vec<f64>,
     inertia: Vec<f64>,
     gravity: Vec<f64>,
+    /// Which parameter is that of gravity.
+    last: usize,
+}
+
+impl Payload {
+    /// What is different in lane `lane` during `tick`.
+    fn load<P: Mover>(&self, lane: usize, tick: Tick, scene: &Scene<'_, P>, effect: &mut P::Effect) {
+        let (end, time, inertia, gravity) = (tick.time + tick.step, self.time[lane], self.inertia[lane], self.gravity[lane]);
+        if end <= time {
+            return;
+        }
+        // In the tick in which it happens, for what is left of it: what the whole tick then amounts to is the same as
+        // that of its two parts, `(1 - left) torque / inertia + left (torque after) / (inertia after)`.
+        let left = ((end - time) / tick.step).min(1.0);
+        let share = left / (1.0 + inertia * (1.0 - left));
+        let state = &scene.states[lane];
+        let motion = P::motion(state);
+        let midway = motion.position + 0.5 * tick.step * motion.velocity;
+        let push = P::push(effect);
+        push.inertia += share * inertia * P::inertia(scene.dynamics, lane, state);
+        if gravity != 0.0 {
+            push.effort += share * gravity * P::external(scene.dynamics, lane, state, midway);
+        }
+    }
 }
 
 impl<P: Mover> Law<P> for Payload {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.time);
+        change.parameter(1, &mut self.inertia);
+        change.parameter(self.last, &mut self.gravity);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        let end = tick.time + tick.step;
-        let parameters = self.time.iter().zip(&self.inertia).zip(&self.gravity);
-        let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();
-        for (lane, ((effect, state), ((time, inertia), gravity))) in lanes {
-            if end <= *time {
-                continue;
-            }
-            // In the tick in which it happens, for what is left of it: what the whole tick then amounts to is the same as
-            // that of its two parts, `(1 - left) torque / inertia + left (torque after) / (inertia after)`.
-            let left = ((end - time) / tick.step).min(1.0);
-            let share = left / (1.0 + inertia * (1.0 - left));
-            let motion = P::motion(state);
-            let midway = motion.position + 0.5 * tick.step * motion.velocity;
-            let push = P::push(effect);
-            push.inertia += share * inertia * P::inertia(scene.dynamics, lane, state);
-            if *gravity != 0.0 {
-                push.effort += share * gravity * P::external(scene.dynamics, lane, state, midway);
-            }
-        }
+        effects.iter_mut().enumerate().for_each(|(lane, effect)| self.load(lane, tick, scene, effect));
+    }
+
+    fn act_each(&mut self, ticks: Ticks<'_>, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        effects.iter_mut().enumerate().for_each(|(lane, effect)| self.load(lane, ticks.lane(lane), scene, effect));
     }
 }
 

@@ -1,7 +1,7 @@
 //! Drag that grows with the square of the speed: air, water, a fan.
 
 use crate::robot::{Mover, Push};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-coefficient |v| v`, taken as a damping so that no step can overshoot it; in the form `power`,
 /// `-unit_torque |v|^power sign(v)`, where `unit_torque` is that at 1 rad/s.
@@ -49,6 +49,10 @@ impl<P: Mover> Mechanism<P> for QuadraticDrag {
 struct Drag(Vec<f64>);
 
 impl<P: Mover> Law<P> for Drag {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         for ((effect, state), coefficient) in effects.iter_mut().zip(scene.states).zip(&self.0) {
             drag(P::push(effect), coefficient * P::motion(state).velocity.abs(), 1.0, tick.step);
@@ -64,6 +68,11 @@ struct PowerDrag {
 }
 
 impl<P: Mover> Law<P> for PowerDrag {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.coefficient);
+        change.derived(&mut self.beyond_linear, |values| values[1] - 1.0);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let parameters = self.coefficient.iter().zip(&self.beyond_linear);
         for ((effect, state), (coefficient, beyond)) in effects.iter_mut().zip(scene.states).zip(parameters) {

@@ -1,7 +1,7 @@
 //! A spring towards position 0: a cable, a bellows, a return spring.
 
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-rate q`; in the form `bent`, `-bent_rate q - third_rate q^3`: no spring is quite straight, and one that bends is one
 /// spring, not two.
@@ -50,6 +50,11 @@ struct BentSpring {
 }
 
 impl<P: Mover> Law<P> for BentSpring {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.rates);
+        change.parameter(1, &mut self.thirds);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let lanes = effects.iter_mut().zip(scene.states).zip(self.rates.iter().zip(&self.thirds));
         for ((effect, state), (rate, third)) in lanes {
@@ -65,6 +70,10 @@ impl<P: Mover> Law<P> for BentSpring {
 struct Spring(Vec<f64>);
 
 impl<P: Mover> Law<P> for Spring {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
         effects.iter_mut().zip(&self.0).for_each(|(effect, rate)| P::push(effect).stiffness += rate);
     }

@@ -1,7 +1,7 @@
 //! Dry friction that is stronger in slow motion than in fast: a joint that sticks and slips.
 
 use crate::robot::Mover;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// Dry friction of `torque + excess exp(-(v / stribeck_velocity)^2)`; in the form `tustin`,
 /// `torque + excess exp(-|v| / tustin_velocity)`.
@@ -64,6 +64,12 @@ struct Friction {
 }
 
 impl Friction {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.torque);
+        change.parameter(1, &mut self.excess);
+        change.derived(&mut self.fading, |values| 1.0 / values[2]);
+    }
+
     /// `fading` gives the part of the excess that is left at a speed in units of its parameter, and minus its derivative.
     fn add<P: Mover>(
         &self,
@@ -97,6 +103,10 @@ pub(super) fn falling(fall: f64, inertia: f64, step: f64) -> f64 {
 struct Gaussian(Friction);
 
 impl<P: Mover> Law<P> for Gaussian {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change(change);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         self.0.add(tick, scene, effects, |ratio| {
             let left = (-ratio * ratio).exp();
@@ -109,6 +119,10 @@ impl<P: Mover> Law<P> for Gaussian {
 struct Tustin(Friction);
 
 impl<P: Mover> Law<P> for Tustin {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change(change);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         self.0.add(tick, scene, effects, |ratio| {
             let left = (-ratio).exp();

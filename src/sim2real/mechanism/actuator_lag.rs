@@ -1,7 +1,7 @@
 //! An actuator that follows its command with a lag.
 
 use super::decay::Decay;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `time_constant du/dt = u_command - u`; in the form `two_stage`, two such lags of half of `total_time` each, one after the
 /// other: a filter, then a winding; in the form `two_poles` the two have each a time constant of its own.
@@ -43,8 +43,11 @@ where
         let half = || thetas.row(0).iter().map(|time| 0.5 * time).collect();
         match form {
             0 => Box::new(lag(thetas.row(0).to_vec())),
-            1 => Box::new(Stages { first: lag(half()), second: lag(half()) }),
-            _ => Box::new(Stages { first: lag(thetas.row(0).to_vec()), second: lag(thetas.row(1).to_vec()) }),
+            1 => Box::new(Stages { first: lag(half()), second: lag(half()), alike: true }),
+            _ => {
+                let [first, second] = [0, 1].map(|k| lag(thetas.row(k).to_vec()));
+                Box::new(Stages { first, second, alike: false })
+            }
         }
     }
 }
@@ -61,6 +64,10 @@ impl<P: Plant> Law<P> for Lag
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.change_by(change, |values| values[0]);
+    }
+
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
         let gained = self.decay.over(tick.step, &self.time_constant);
         let lanes = commands.iter_mut().zip(&self.time_constant).zip(&mut self.follower).zip(gained);
@@ -76,19 +83,36 @@ where
     }
 }
 
+impl Lag {
+    /// Changes a lane, whose time constant follows from its parameters by `of`.
+    fn change_by(&mut self, change: &LaneChange<'_>, of: impl Fn(&[f64]) -> f64) {
+        change.derived(&mut self.time_constant, &of);
+        change.memory(&mut self.follower);
+        self.decay.change(change, of);
+    }
+}
+
 /// Two stages, of which the second follows the first.
 #[derive(Clone)]
 struct Stages {
     first: Lag,
     second: Lag,
+    /// Whether both have half of one time constant.
+    alike: bool,
 }
 
 impl<P: Plant> Law<P> for Stages
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        let alike = self.alike;
+        self.first.change_by(change, |values| if alike { 0.5 * values[0] } else { values[0] });
+        self.second.change_by(change, |values| if alike { 0.5 * values[0] } else { values[1] });
+    }
+
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
-        let Self { first, second } = self;
+        let Self { first, second, .. } = self;
         let gained =
             (first.decay.over(tick.step, &first.time_constant), second.decay.over(tick.step, &second.time_constant));
         for (lane, command) in commands.iter_mut().enumerate() {

@@ -1,6 +1,6 @@
 //! A sensor that is off by a constant.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y -> y + offset`, on the plant's first channel.
 ///
@@ -41,6 +41,10 @@ impl<P: Plant> Law<P> for Offset
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
         for (observation, offset) in observations.iter_mut().zip(&self.0) {
             if let Some(y) = observation.as_mut().first_mut() {

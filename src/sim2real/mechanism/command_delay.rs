@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::sim2real::{
-    About, Command, DelayLine, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical,
+    About, Command, DelayLine, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Ticks, Typical,
 };
 
 /// `u(t) -> u(t - seconds)`; an order arrives `seconds` after it was sent.
@@ -54,6 +54,16 @@ struct Delay<P: Plant> {
 }
 
 impl<P: Plant> Law<P> for Delay<P> {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.seconds);
+        change.memory(&mut self.lines);
+    }
+
+    fn shape_each(&mut self, ticks: Ticks<'_>, commands: &mut [P::Command]) {
+        let lanes = commands.iter_mut().zip(&mut self.lines).zip(&self.seconds).enumerate();
+        lanes.for_each(|(lane, ((command, line), seconds))| line.pass(ticks.lane(lane), *seconds, command));
+    }
+
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
         for ((command, line), seconds) in commands.iter_mut().zip(&mut self.lines).zip(&self.seconds) {
             line.pass(tick, *seconds, command);

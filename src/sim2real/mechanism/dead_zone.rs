@@ -1,6 +1,6 @@
 //! A command too small to have any effect.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `u -> 0` where `|u| <= width`, `u - sign(u) width` elsewhere; in the form `soft`, `u -> u - u / sqrt(1 + (u / soft_width)^2)`,
 /// as where several small gaps, or a driver's crossover, add up.
@@ -47,6 +47,10 @@ impl<P: Plant> Law<P> for Width
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
         for (command, width) in commands.iter_mut().zip(&self.0) {
             let u = command.as_mut();
@@ -64,6 +68,10 @@ impl<P: Plant> Law<P> for SoftWidth
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
         for (command, width) in commands.iter_mut().zip(&self.0) {
             let u = command.as_mut();

@@ -1,5 +1,7 @@
 //! How far what decays exponentially has come after a step.
 
+use crate::sim2real::LaneChange;
+
 /// `1 - exp(-step / time_constant)` over lanes, kept while the step stays the same: an exponential costs more than
 /// all the rest of most laws.
 #[derive(Debug, Clone, Default)]
@@ -15,9 +17,19 @@ impl Decay {
         if self.gained.is_empty() || self.step.to_bits() != step.to_bits() {
             self.step = step;
             self.gained.clear();
-            let gained = time_constant.iter().map(|tau| if *tau > 0.0 { -(-step / tau).exp_m1() } else { 1.0 });
-            self.gained.extend(gained);
+            self.gained.extend(time_constant.iter().map(|tau| gained(step, *tau)));
         }
         &self.gained
     }
+
+    /// Changes a lane, whose time constant [s] follows from its parameters by `time_constant`.
+    pub(super) fn change(&mut self, change: &LaneChange<'_>, time_constant: impl FnOnce(&[f64]) -> f64) {
+        let step = self.step;
+        change.derived(&mut self.gained, |values| gained(step, time_constant(values)));
+    }
+}
+
+/// The part of the way that a lane goes in `step` [s].
+pub(super) fn gained(step: f64, time_constant: f64) -> f64 {
+    if time_constant > 0.0 { -(-step / time_constant).exp_m1() } else { 1.0 }
 }

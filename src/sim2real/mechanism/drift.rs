@@ -1,6 +1,7 @@
 //! A sensor whose zero moves with time.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+use super::decay::gained;
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y -> y + rate t`, on the plant's first channel; in the form `settling`, `y -> y + offset (1 - exp(-t / time_constant))`, as
 /// of electronics that warm up; in the form `under_way`, `y -> y + end (1 - (1 - share) exp(-t / time_constant))`, as of those
@@ -63,8 +64,8 @@ where
         let times = || thetas.row(1).to_vec();
         match form {
             0 => Box::new(Rate(size)),
-            1 => Box::new(Settling { share: vec![0.0; size.len()], end: size, time_constant: times() }),
-            _ => Box::new(Settling { share: thetas.row(2).to_vec(), end: size, time_constant: times() }),
+            1 => Box::new(Settling { under_way: false, share: vec![0.0; size.len()], end: size, time_constant: times() }),
+            _ => Box::new(Settling { under_way: true, share: thetas.row(2).to_vec(), end: size, time_constant: times() }),
         }
     }
 }
@@ -76,6 +77,18 @@ impl<P: Plant> Law<P> for Rate
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
+    fn sense_each(&mut self, times: &[f64], observations: &mut [P::Observation]) {
+        for ((observation, rate), time) in observations.iter_mut().zip(&self.0).zip(times) {
+            if let Some(y) = observation.as_mut().first_mut() {
+                *y += rate * time;
+            }
+        }
+    }
+
     fn sense(&mut self, time: f64, observations: &mut [P::Observation]) {
         for (observation, rate) in observations.iter_mut().zip(&self.0) {
             if let Some(y) = observation.as_mut().first_mut() {
@@ -87,25 +100,41 @@ where
 
 #[derive(Clone)]
 struct Settling {
+    /// Whether there is a share, which is the third parameter.
+    under_way: bool,
     /// How much of it lies behind at the recording's beginning.
     share: Vec<f64>,
     end: Vec<f64>,
     time_constant: Vec<f64>,
 }
 
+impl Settling {
+    fn add(&self, lane: usize, time: f64, channels: &mut [f64]) {
+        let (share, end, tau) = (self.share[lane], self.end[lane], self.time_constant[lane]);
+        if let Some(y) = channels.first_mut() {
+            *y += end * (share + (1.0 - share) * gained(time.max(0.0), tau));
+        }
+    }
+}
+
 impl<P: Plant> Law<P> for Settling
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        let under_way = self.under_way;
+        change.parameter(0, &mut self.end);
+        change.parameter(1, &mut self.time_constant);
+        change.derived(&mut self.share, |values| if under_way { values[2] } else { 0.0 });
+    }
+
+    fn sense_each(&mut self, times: &[f64], observations: &mut [P::Observation]) {
+        let lanes = observations.iter_mut().zip(times).enumerate();
+        lanes.for_each(|(lane, (observation, time))| self.add(lane, *time, observation.as_mut()));
+    }
+
     fn sense(&mut self, time: f64, observations: &mut [P::Observation]) {
-        let since = time.max(0.0);
-        for (lane, observation) in observations.iter_mut().enumerate() {
-            let (share, end, tau) = (self.share[lane], self.end[lane], self.time_constant[lane]);
-            if let Some(y) = observation.as_mut().first_mut() {
-                let settled = if tau > 0.0 { -(-since / tau).exp_m1() } else { 1.0 };
-                *y += end * (share + (1.0 - share) * settled);
-            }
-        }
+        observations.iter_mut().enumerate().for_each(|(lane, observation)| self.add(lane, time, observation.as_mut()));
     }
 }
 

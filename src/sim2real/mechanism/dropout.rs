@@ -2,7 +2,9 @@
 
 use rand::RngExt;
 
-use crate::sim2real::{About, Draws, Form, Law, Mechanism, Parameter, Plant, Seed, Signs, Site, Thetas, Typical};
+use crate::sim2real::{
+    About, Draws, Form, LaneChange, LaneDraws, Law, Mechanism, Parameter, Plant, Seed, Signs, Site, Thetas, Typical,
+};
 
 /// With `probability` a row repeats the row before, in all channels: a message was lost, and what reads the sensor holds
 /// the last. In the form `bursts`, losses begin with `probability` and last `length` rows in the mean, as of a bus that is
@@ -62,11 +64,24 @@ where
         // Independent losses go on as they begin.
         let goes_on = match form {
             0 => begins.clone(),
-            _ => thetas.row(1).iter().map(|length| 1.0 - 1.0 / length.max(1.0)).collect(),
+            _ => thetas.row(1).iter().map(|length| going_on(*length)).collect(),
         };
         let held = vec![None; thetas.lanes()];
-        Box::new(Losses::<P> { begins, goes_on, lost: vec![false; thetas.lanes()], held, draws: seed.stream("dropout") })
+        Box::new(Losses::<P> {
+            begins,
+            goes_on,
+            bursts: form != 0,
+            lost: vec![false; thetas.lanes()],
+            held,
+            draws: seed.stream("dropout"),
+            lane_draws: LaneDraws::new("dropout", thetas.lanes()),
+        })
     }
+}
+
+/// Probability that a loss goes on, of those that last `length` rows in the mean.
+fn going_on(length: f64) -> f64 {
+    1.0 - 1.0 / length.max(1.0)
 }
 
 #[derive(Clone)]
@@ -75,24 +90,47 @@ struct Losses<P: Plant> {
     begins: Vec<f64>,
     /// ... and after one that was.
     goes_on: Vec<f64>,
+    /// Whether losses go on in bursts.
+    bursts: bool,
     lost: Vec<bool>,
     /// What was last reported; none before the first row, which is not lost.
     held: Vec<Option<P::Observation>>,
     draws: Draws,
+    lane_draws: LaneDraws,
+}
+
+impl<P: Plant> Losses<P> {
+    fn pass(&mut self, lane: usize, draw: f64, observation: &mut P::Observation) {
+        let (lost, held) = (&mut self.lost[lane], &mut self.held[lane]);
+        *lost = held.is_some() && draw < if *lost { self.goes_on[lane] } else { self.begins[lane] };
+        match held {
+            Some(held) if *lost => observation.clone_from(held),
+            Some(held) => held.clone_from(observation),
+            None => *held = Some(observation.clone()),
+        }
+    }
 }
 
 impl<P: Plant> Law<P> for Losses<P> {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        let bursts = self.bursts;
+        change.parameter(0, &mut self.begins);
+        change.derived(&mut self.goes_on, |values| if bursts { going_on(values[1]) } else { values[0] });
+        change.memory(&mut self.lost);
+        change.memory(&mut self.held);
+        change.draws(&mut self.lane_draws);
+    }
+
+    fn sense_each(&mut self, _times: &[f64], observations: &mut [P::Observation]) {
+        for (lane, observation) in observations.iter_mut().enumerate() {
+            let draw = self.lane_draws.lane(lane).unit();
+            self.pass(lane, draw, observation);
+        }
+    }
+
     fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
         let draw: f64 = self.draws.random();
-        let lanes = self.begins.iter().zip(&self.goes_on).zip(&mut self.lost).zip(&mut self.held);
-        for (observation, (((begins, goes_on), lost), held)) in observations.iter_mut().zip(lanes) {
-            *lost = held.is_some() && draw < if *lost { *goes_on } else { *begins };
-            match held {
-                Some(held) if *lost => observation.clone_from(held),
-                Some(held) => held.clone_from(observation),
-                None => *held = Some(observation.clone()),
-            }
-        }
+        observations.iter_mut().enumerate().for_each(|(lane, observation)| self.pass(lane, draw, observation));
     }
 }
 

@@ -1,6 +1,6 @@
 //! A sensor whose disc does not run true.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y -> y + sine sin(y) + cosine cos(y)`, on the plant's first channel, an angle: a disc off its axis is wrong once a turn. In the
 /// form `two_harmonics`, also `second_sine sin(2 y) + second_cosine cos(2 y)`: a disc that is oval or tilted, or a ring magnet
@@ -62,6 +62,10 @@ impl<P: Plant> Law<P> for Waves
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.0, |values| std::array::from_fn(|k| values.get(k).copied().unwrap_or_default()));
+    }
+
     fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
         for (observation, waves) in observations.iter_mut().zip(&self.0) {
             if let Some(y) = observation.as_mut().first_mut() {

@@ -1,6 +1,6 @@
 //! An actuator that gives more or less than it is told to.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `u -> (1 + error) u`; in the form `asymmetric`, `u -> (1 + negative_error) u` where `u < 0` and `u` elsewhere, as of a
 /// cylinder with a rod on one side, or an output stage whose halves differ.
@@ -40,7 +40,7 @@ where
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let negative: Vec<f64> = thetas.row(0).iter().map(|error| 1.0 + error).collect();
         let positive = if form == 0 { negative.clone() } else { vec![1.0; thetas.lanes()] };
-        Box::new(Gains { positive, negative })
+        Box::new(Gains { positive, negative, both: form == 0 })
     }
 }
 
@@ -48,12 +48,20 @@ where
 struct Gains {
     positive: Vec<f64>,
     negative: Vec<f64>,
+    /// Whether the error is that of both signs.
+    both: bool,
 }
 
 impl<P: Plant> Law<P> for Gains
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        let both = self.both;
+        change.derived(&mut self.negative, |values| 1.0 + values[0]);
+        change.derived(&mut self.positive, |values| if both { 1.0 + values[0] } else { 1.0 });
+    }
+
     fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
         for ((command, positive), negative) in commands.iter_mut().zip(&self.positive).zip(&self.negative) {
             let u = command.as_mut();

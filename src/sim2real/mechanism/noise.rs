@@ -2,8 +2,10 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
-use super::decay::Decay;
-use crate::sim2real::{About, Draws, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+use super::decay::{Decay, gained};
+use crate::sim2real::{
+    About, Draws, Form, LaneChange, LaneDraws, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical,
+};
 
 /// `y -> y + n`, on the plant's first channel, with Gaussian `n` of standard deviation `std`, independent from row to row; in
 /// the form `coloured`, of the correlation `exp(-dt / correlation_time)` over a time `dt`.
@@ -54,6 +56,9 @@ where
             last: None,
             decay: Decay::default(),
             draws: seed.stream("noise"),
+            coloured: form != 0,
+            own: vec![None; lanes],
+            lane_draws: LaneDraws::new("noise", lanes),
         })
     }
 }
@@ -68,20 +73,60 @@ struct Process {
     last: Option<f64>,
     decay: Decay,
     draws: Draws,
+    /// Whether the correlation time is the second parameter.
+    coloured: bool,
+    /// Where each lane has its own clock: the time of its last row [s].
+    own: Vec<Option<f64>>,
+    lane_draws: LaneDraws,
+}
+
+impl Process {
+    /// What the noise of lane `lane` is, in standard deviations, where it has gained this much and `draw` is new.
+    fn step(value: &mut f64, gained: f64, draw: f64) {
+        // With the correlation 1 - g, what is new has the variance 1 - (1 - g)^2 = g (2 - g).
+        *value += (gained * (2.0 - gained)).sqrt() * draw - *value * gained;
+    }
 }
 
 impl<P: Plant> Law<P> for Process
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.std);
+        if self.coloured {
+            change.parameter(1, &mut self.correlation_time);
+            self.decay.change(change, |values| values[1]);
+        }
+        change.memory(&mut self.value);
+        change.memory(&mut self.own);
+        change.draws(&mut self.lane_draws);
+    }
+
+    fn sense_each(&mut self, times: &[f64], observations: &mut [P::Observation]) {
+        for (lane, (observation, time)) in observations.iter_mut().zip(times).enumerate() {
+            let (std, value) = (self.std[lane], &mut self.value[lane]);
+            let draw: f64 = StandardNormal.sample(self.lane_draws.lane(lane));
+            // What is correlated has to be known from the last row on; the rest is new.
+            let new = match self.own[lane].filter(|_| self.coloured) {
+                Some(last) => gained(*time - last, self.correlation_time[lane]),
+                None => 1.0,
+            };
+            self.own[lane] = Some(*time);
+            Self::step(value, new, draw);
+            if let Some(y) = observation.as_mut().first_mut() {
+                *y += std * *value;
+            }
+        }
+    }
+
     fn sense(&mut self, time: f64, observations: &mut [P::Observation]) {
         let draw: f64 = StandardNormal.sample(&mut self.draws);
         let gained = self.decay.over(self.last.map_or(f64::INFINITY, |last| time - last), &self.correlation_time);
         self.last = Some(time);
         let lanes = self.std.iter().zip(&mut self.value).zip(gained);
         for (observation, ((std, value), gained)) in observations.iter_mut().zip(lanes) {
-            // With the correlation 1 - g, what is new has the variance 1 - (1 - g)^2 = g (2 - g).
-            *value += (gained * (2.0 - gained)).sqrt() * draw - *value * gained;
+            Self::step(value, *gained, draw);
             if let Some(y) = observation.as_mut().first_mut() {
                 *y += std * *value;
             }

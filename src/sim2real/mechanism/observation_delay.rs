@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::sim2real::{About, Form, Law, Mechanism, Observation, Parameter, Plant, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Observation, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y(t) -> y(t - seconds)`, in all channels: filters, buses and exposure times of a camera.
 ///
@@ -44,13 +44,14 @@ where
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let lines = thetas.row(0).iter().map(|seconds| Line::new(*seconds)).collect();
-        Box::new(Late::<P> { lines, rates: self.rates })
+        let seconds = thetas.row(0).to_vec();
+        Box::new(Late::<P> { lines: vec![Line::default(); seconds.len()], seconds, rates: self.rates })
     }
 }
 
 #[derive(Clone)]
 struct Late<P: Plant> {
+    seconds: Vec<f64>,
     lines: Vec<Line<P::Observation>>,
     rates: &'static [(usize, usize)],
 }
@@ -59,9 +60,19 @@ impl<P: Plant> Law<P> for Late<P>
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.seconds);
+        change.memory(&mut self.lines);
+    }
+
+    fn sense_each(&mut self, times: &[f64], observations: &mut [P::Observation]) {
+        let lanes = observations.iter_mut().zip(&mut self.lines).zip(&self.seconds).zip(times);
+        lanes.for_each(|(((observation, line), seconds), time)| line.pass(*time, *seconds, observation, self.rates));
+    }
+
     fn sense(&mut self, time: f64, observations: &mut [P::Observation]) {
-        for (observation, line) in observations.iter_mut().zip(&mut self.lines) {
-            line.pass(time, observation, self.rates);
+        for ((observation, line), seconds) in observations.iter_mut().zip(&mut self.lines).zip(&self.seconds) {
+            line.pass(time, *seconds, observation, self.rates);
         }
     }
 }
@@ -69,20 +80,21 @@ where
 /// The past of one lane, as far back as its delay reaches.
 #[derive(Clone)]
 struct Line<O> {
-    seconds: f64,
     /// Rows (time [s], observation), oldest first.
     past: VecDeque<(f64, O)>,
     /// Rows that have left the line, to be written over: a delay that is under way takes no more memory.
     left: Vec<O>,
 }
 
-impl<O: Observation + AsMut<[f64]>> Line<O> {
-    fn new(seconds: f64) -> Self {
-        Self { seconds, past: VecDeque::new(), left: Vec::new() }
+impl<O> Default for Line<O> {
+    fn default() -> Self {
+        Self { past: VecDeque::new(), left: Vec::new() }
     }
+}
 
-    fn pass(&mut self, time: f64, observation: &mut O, rates: &[(usize, usize)]) {
-        let from = time - self.seconds;
+impl<O: Observation + AsMut<[f64]>> Line<O> {
+    fn pass(&mut self, time: f64, seconds: f64, observation: &mut O, rates: &[(usize, usize)]) {
+        let from = time - seconds;
         while !self.past.is_empty() && self.past.get(1).map_or(time, |(next, _)| *next) <= from {
             self.left.extend(self.past.pop_front().map(|(_, row)| row));
         }
@@ -188,9 +200,9 @@ mod tests {
 
     #[test]
     fn the_line_forgets_what_has_left_it() {
-        let mut line = Line::<[f64; 2]>::new(0.02);
+        let mut line = Line::<[f64; 2]>::default();
         for i in 0..10_000 {
-            line.pass(f64::from(i) * 1e-3, &mut [f64::from(i), 0.0], &[(0, 1)]);
+            line.pass(f64::from(i) * 1e-3, 0.02, &mut [f64::from(i), 0.0], &[(0, 1)]);
         }
         assert!(line.past.len() + line.left.len() < 30);
         assert!(Mechanism::<Wire>::followed(&WITH_RATE, 0));

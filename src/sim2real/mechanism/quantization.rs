@@ -1,6 +1,6 @@
 //! A sensor that counts in steps.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Signs, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Signs, Site, Thetas, Typical};
 
 /// `y -> round(y / step) step`, on the plant's first channel.
 ///
@@ -53,6 +53,10 @@ impl<P: Plant> Law<P> for Steps
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
         for (observation, step) in observations.iter_mut().zip(&self.0) {
             if let Some(y) = observation.as_mut().first_mut().filter(|_| *step > 0.0) {

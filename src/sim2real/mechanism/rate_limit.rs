@@ -1,6 +1,6 @@
 //! An actuator whose output cannot change as fast as its command.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `|du/dt| <= rate`: the output ramps towards a command that holds until it reaches it.
 ///
@@ -56,6 +56,11 @@ impl<P: Plant> Law<P> for Ramp
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.rate);
+        change.memory(&mut self.output);
+    }
+
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
         for ((command, rate), output) in commands.iter_mut().zip(&self.rate).zip(&mut self.output) {
             let u = command.as_mut();

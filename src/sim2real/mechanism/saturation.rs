@@ -1,6 +1,6 @@
 //! A command larger than the actuator can give.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `u -> min(max(u, -limit), limit)`; in the form `soft`, `u -> u / sqrt(1 + (u / soft_limit)^2)`; in the form `bent`,
 /// `u -> u / (1 + |u / bent_limit|^sharpness)^(1 / sharpness)`, which has the others within it: an amplifier that runs into
@@ -58,6 +58,11 @@ impl<P: Plant> Law<P> for BentLimit
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.limits);
+        change.parameter(1, &mut self.sharpness);
+    }
+
     fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
         for ((command, limit), sharpness) in commands.iter_mut().zip(&self.limits).zip(&self.sharpness) {
             let u = command.as_mut();
@@ -76,6 +81,10 @@ impl<P: Plant> Law<P> for Limit
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
         for (command, limit) in commands.iter_mut().zip(&self.0) {
             let u = command.as_mut();
@@ -91,6 +100,10 @@ impl<P: Plant> Law<P> for SoftLimit
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.0);
+    }
+
     fn shape(&mut self, _tick: Tick, commands: &mut [P::Command]) {
         for (command, limit) in commands.iter_mut().zip(&self.0) {
             let u = command.as_mut();

@@ -1,6 +1,6 @@
 //! A sensor that reads too much or too little, in proportion.
 
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y -> (1 + error) y`, on the plant's first channel: a wrong count of pulses per turn, of teeth, or of volts; in the form
 /// `bent`, `y -> (1 + bent_error + bow y^2) y`, as of a potentiometer, which is not quite straight either.
@@ -52,6 +52,11 @@ impl<P: Plant> Law<P> for BentFactor
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.factor, |values| 1.0 + values[0]);
+        change.parameter(1, &mut self.bow);
+    }
+
     fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
         for ((observation, factor), bow) in observations.iter_mut().zip(&self.factor).zip(&self.bow) {
             if let Some(y) = observation.as_mut().first_mut() {
@@ -68,6 +73,10 @@ impl<P: Plant> Law<P> for Factor
 where
     P::Observation: AsMut<[f64]>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.0, |values| 1.0 + values[0]);
+    }
+
     fn sense(&mut self, _time: f64, observations: &mut [P::Observation]) {
         for (observation, factor) in observations.iter_mut().zip(&self.0) {
             if let Some(y) = observation.as_mut().first_mut() {

@@ -1,7 +1,7 @@
 //! An actuator that weakens as it warms.
 
 use super::decay::Decay;
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `dh/dt = strength u^2 - h / time_constant`, `u -> max(0, 1 - h) u`: magnets weaken with the heat that currents leave in the
 /// windings. In the form `reciprocal`, with `reciprocal_strength`, `u -> u / (1 + h)`: copper's resistance grows, and a voltage
@@ -76,6 +76,13 @@ struct Heat {
 }
 
 impl Heat {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.strength);
+        change.parameter(1, &mut self.time_constant);
+        change.memory(&mut self.lost);
+        self.decay.change(change, |values| values[1]);
+    }
+
     /// Takes up what the commands leave in the tick, and gives each the gain that the mean heat over the tick leaves it.
     fn pass<C: AsMut<f64>>(&mut self, tick: Tick, commands: &mut [C], gain: impl Fn(f64) -> f64) {
         let gained = self.decay.over(tick.step, &self.time_constant);
@@ -97,6 +104,15 @@ impl<P: Plant> Law<P> for Magnets
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change(change);
+    }
+
+    /// The part of the gain that the heat takes.
+    fn told(&self, lane: usize) -> Option<f64> {
+        self.0.lost.get(lane).copied()
+    }
+
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
         self.0.pass(tick, commands, |heat| (1.0 - heat).max(0.0));
     }
@@ -109,6 +125,15 @@ impl<P: Plant> Law<P> for Copper
 where
     P::Command: AsMut<f64>,
 {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.0.change(change);
+    }
+
+    /// The part of the gain that the heat takes.
+    fn told(&self, lane: usize) -> Option<f64> {
+        self.0.lost.get(lane).copied()
+    }
+
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
         self.0.pass(tick, commands, |heat| 1.0 / (1.0 + heat));
     }

@@ -34,6 +34,7 @@ pub use posterior::{Posterior, PosteriorError};
 pub use predictive::{BANDS, BandShare, Bands, Coverage, OUTSIDE, WIDEST, quantiles};
 pub use preset::{Preset, PresetRow, Presets};
 pub use randomizer::{RandomizeError, Randomizer, Turn};
-pub use stream::Occasion;
+pub(super) use stream::mixed;
+pub use stream::{DrawKey, Occasion};
 pub use table::DrawTable;
 pub use target::{Implausible, Randomized, Redraw, Target};

@@ -4,7 +4,7 @@ use super::correlation::{Correlation, CorrelationError, Group, groups};
 use super::distribution::Inverse;
 use super::level::Level;
 use super::normal::normal_quantile;
-use super::stream::{Occasion, Streams, name_key, uniform};
+use super::stream::{DrawKey, Occasion, Streams, name_key, uniform};
 use super::{DrawTable, Implausible, Randomized, Redraw, Target};
 use crate::sim2real::Seed;
 
@@ -174,7 +174,20 @@ impl Randomizer {
     /// The same for one environment alone, the one numbered `number` in entry `place` of the table: environments need not begin
     /// their episodes together.
     pub fn redraw(&self, table: &mut DrawTable, place: usize, seed: Seed, occasion: Occasion, turn: Turn, level: Level) {
-        let key = Streams::new(seed, occasion).environment(turn.environment, turn.episode);
+        self.redraw_by(table, place, DrawKey::new(seed), occasion, turn, level);
+    }
+
+    /// The same, with the key of the seed.
+    pub fn redraw_by(
+        &self,
+        table: &mut DrawTable,
+        place: usize,
+        key: DrawKey,
+        occasion: Occasion,
+        turn: Turn,
+        level: Level,
+    ) {
+        let key = Streams::of(key, occasion).environment(turn.environment, turn.episode);
         for (k, entry) in self.entries.iter().enumerate() {
             match entry.part_in(occasion) {
                 Part::Drawn if !entry.grouped => entry.fill(&[key], &mut table.row_mut(k)[place..=place], level),

@@ -16,6 +16,18 @@ pub enum Occasion {
     Regime(usize, u64),
 }
 
+/// What all draws of a seed begin with. To find it takes longer than all else of a draw: what draws often from the same seed keeps it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DrawKey(u64);
+
+impl DrawKey {
+    /// That of a seed.
+    #[must_use]
+    pub fn new(seed: Seed) -> Self {
+        Self(seed.stream("randomize").next_u64())
+    }
+}
+
 /// The streams of a randomizer: a number in (0, 1) depends on the seed, the environment, the episode, the occasion and the name
 /// of what is drawn, and on nothing else: neither on how many environments there are, nor on what else is drawn, nor on threads.
 ///
@@ -31,7 +43,7 @@ pub(super) struct Streams {
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Mixes all bits of `z` into all bits.
-const fn mixed(z: u64) -> u64 {
+pub(in crate::sim2real) const fn mixed(z: u64) -> u64 {
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
@@ -45,7 +57,11 @@ const fn with(key: u64, number: u64) -> u64 {
 impl Streams {
     /// The streams of `seed` for `occasion`.
     pub fn new(seed: Seed, occasion: Occasion) -> Self {
-        let key = seed.stream("randomize").next_u64();
+        Self::of(DrawKey::new(seed), occasion)
+    }
+
+    /// The same of a seed whose key is there already.
+    pub fn of(DrawKey(key): DrawKey, occasion: Occasion) -> Self {
         let [kind, which, time] = match occasion {
             Occasion::Startup => [0, 0, 0],
             Occasion::Reset => [1, 0, 0],

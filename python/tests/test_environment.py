@@ -1,0 +1,323 @@
+"""Single environments: Gymnasium's own check on every id, seeds, snapshots, bad input, and a fuzz of the interface."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import warnings
+
+import numpy as np
+import pytest
+
+gymnasium = pytest.importorskip("gymnasium")
+
+from gymnasium.utils.env_checker import check_env
+
+import trueup
+from trueup import envs
+
+IDS = sorted(envs.ids())
+CART_POLE = "trueup/CartPole-v0"
+
+
+def played(env, steps, seed=None, actions_seed=0):
+    """What comes of random actions, as bytes."""
+    out = [env.reset(seed=seed)[0].tobytes()]
+    env.action_space.seed(actions_seed)
+    for _ in range(steps):
+        observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+        out.append((observation.tobytes(), reward, terminated, truncated, tuple(info.items())))
+        if terminated or truncated:
+            out.append(env.reset()[0].tobytes())
+    return out
+
+
+def test_there_are_environments():
+    assert CART_POLE in IDS and all(identity.startswith("trueup/") and about for identity, about in envs.ids().items())
+    gymnasium.register_envs(trueup)
+    assert set(IDS) <= set(gymnasium.registry)
+
+
+@pytest.mark.parametrize("identity", IDS)
+def test_gymnasium_has_nothing_to_say(identity):
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        check_env(gymnasium.make(identity).unwrapped)
+    # It recommends that spaces be symmetric and of finite bounds, which physics does not heed.
+    told = [str(one.message) for one in told if not any(words in str(one.message) for words in ("infinity", "recommend", "normalized"))]
+    assert told == []
+
+
+@pytest.mark.parametrize("identity", IDS)
+def test_a_seed_gives_the_same_bits_and_another_does_not(identity):
+    env, again = envs.make(identity), gymnasium.make(identity)
+    first = played(env, 60, seed=7)
+    assert played(again, 60, seed=7) == first
+    assert played(env, 60, seed=7) == first, "after other episodes"
+    assert played(env, 60, seed=8) != first
+    # Without a seed the stream of episodes goes on.
+    assert played(env, 60) != played(env, 60)
+
+
+@pytest.mark.parametrize("identity", IDS)
+def test_observations_and_rewards_are_what_is_said(identity):
+    env = envs.make(identity)
+    about = env.about
+    assert len(about["observation"]["names"]) == np.prod(env.observation_space.shape) == len(about["observation"]["units"])
+    low, high = about["reward_range"]
+    for episode in range(3):
+        observation, info = env.reset(seed=episode)
+        for _ in range(200):
+            assert env.observation_space.contains(observation)
+            assert list(info) == [name for name, _ in about["info"]]
+            observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+            assert type(reward) is float and low <= reward <= high and type(terminated) is bool
+            if terminated or truncated:
+                break
+
+
+@pytest.mark.parametrize("identity", IDS)
+def test_snapshots_branches_and_copies_go_on_with_the_same_bits(identity):
+    env = envs.make(identity)
+    played(env, 20, seed=3)
+    snapshot, branch, copied = env.snapshot(), env.branch(), copy.deepcopy(env)
+    assert branch is not env and branch.np_random is not env.np_random
+
+    def on(env):
+        env.action_space.seed(5)
+        out = []
+        for _ in range(30):
+            step = env.step(env.action_space.sample())
+            out.append((step[0].tobytes(), *step[1:4]))
+            if step[2] or step[3]:
+                out.append(env.reset()[0].tobytes())
+        return out
+
+    env.reset(), branch.restore(snapshot)
+    env.restore(snapshot)
+    if _over(env):
+        env.reset(), branch.reset(), copied.reset()
+    first = on(env)
+    assert on(branch) == first and on(copied) == first
+    env.restore(snapshot)
+    if _over(env):
+        env.reset()
+    assert on(env) == first, "a snapshot can be restored again"
+
+
+def _over(env):
+    try:
+        env.branch().step(env.action_space.sample())
+    except trueup.InputError:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("identity", IDS)
+def test_what_is_pickled_is_fresh_and_made_alike(identity):
+    env = gymnasium.make(identity)
+    first = played(env, 30, seed=4)
+    again = pickle.loads(pickle.dumps(env.unwrapped))
+    assert again.spec.id == identity and again.observation_space == env.observation_space
+    with pytest.raises(trueup.InputError, match="reset"):
+        again.step(again.action_space.sample())
+    assert played(again, 30, seed=4) == first
+
+
+def test_fresh_arrays_are_fresh_and_given_ones_are_written():
+    env = envs.make(CART_POLE)
+    first, _ = env.reset(seed=0)
+    kept = first.copy()
+    second, *_ = env.step(0)
+    assert not np.shares_memory(first, second) and np.array_equal(first, kept)
+    twin = envs.make(CART_POLE)
+    twin.reset(seed=0)
+    into = np.empty(4, np.float32)
+    assert twin.step_into(0, into)[0] == 1.0 and np.array_equal(into, second)
+
+
+def test_seeds_are_by_the_book():
+    env = envs.make(CART_POLE)
+    with pytest.raises(gymnasium.error.Error, match="at least 0"):
+        env.reset(seed=-1)
+    for wrong in ("seed", 1.5, True, [1]):
+        with pytest.raises(trueup.InputError, match="seed"):
+            env.reset(seed=wrong)
+    huge = [env.reset(seed=seed)[0].tobytes() for seed in (0, 2**64 - 1, 2**64, 2**100 + 1, 10**60)]
+    assert len(set(huge)) == len(huge)
+    assert env.reset(seed=2**100 + 1)[0].tobytes() == huge[3]
+    assert env.reset(seed=np.int64(5))[0].tobytes() == env.reset(seed=5)[0].tobytes()
+    assert env.np_random_seed == 5
+    # Two that are never given a seed are no twins.
+    assert envs.make(CART_POLE).reset()[0].tobytes() != envs.make(CART_POLE).reset()[0].tobytes()
+
+
+def test_what_comes_out_of_order_is_said():
+    env = envs.make(CART_POLE)
+    with pytest.raises(trueup.InputError, match="has not been reset") as error:
+        env.step(0)
+    assert error.value.hint
+    env.reset(seed=0)
+    while True:
+        *_, terminated, truncated, _ = env.step(0)
+        if terminated or truncated:
+            break
+    with pytest.raises(trueup.InputError, match="is over"):
+        env.step(0)
+    env.reset()
+    env.close()
+    env.close()
+    for call in (lambda: env.step(0), lambda: env.reset(seed=0)):
+        with pytest.raises(trueup.InputError, match="is closed"):
+            call()
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        2,
+        -1,
+        10**30,
+        0.0,
+        np.float32(0),
+        float("nan"),
+        None,
+        "left",
+        [0],
+        [[0, 1], [0]],
+        np.array([0]),
+        np.zeros((2, 2)),
+        True,
+        object(),
+        {},
+    ],
+)
+def test_an_action_that_is_none_is_refused_and_nothing_moves(action):
+    env, twin = envs.make(CART_POLE), envs.make(CART_POLE)
+    env.reset(seed=1), twin.reset(seed=1)
+    with pytest.raises((trueup.InputError, OverflowError)):
+        env.step(action)
+    assert env.step(1)[0].tobytes() == twin.step(1)[0].tobytes()
+
+
+def _boxes():
+    return [identity for identity in IDS if isinstance(envs.make(identity).action_space, gymnasium.spaces.Box)]
+
+
+@pytest.mark.parametrize("identity", _boxes())
+def test_a_real_action_that_is_none_is_refused_and_nothing_moves(identity):
+    env, twin = envs.make(identity), envs.make(identity)
+    env.reset(seed=1), twin.reset(seed=1)
+    shape, high = env.action_space.shape, env.action_space.high
+    good = np.zeros(shape, np.float32)
+    wrong = [
+        np.full(shape, np.nan),
+        np.full(shape, np.inf),
+        high + 1.0,
+        np.zeros((*shape, 1)),
+        np.zeros(0),
+        "x",
+        None,
+        good.astype(complex),
+        good.astype(bool),
+    ]
+    for action in wrong:
+        with pytest.raises(trueup.InputError) as error:
+            env.step(action)
+        assert error.value.hint
+    # Whole numbers, lists and strided arrays are actions all the same.
+    for same in (good.astype(int), good.tolist(), np.zeros((shape[0] * 2, *shape[1:]), np.float64)[::2]):
+        assert env.step(same)[0].tobytes() == twin.step(good)[0].tobytes()
+
+
+def test_options_are_held_to_what_there_is():
+    with pytest.raises(trueup.InputError, match="no option `gravty`"):
+        envs.make(CART_POLE, gravty=3.0)
+    with pytest.raises(trueup.InputError, match="a number, a truth value or a text"):
+        envs.make(CART_POLE, low=[1])
+    env = envs.make(CART_POLE)
+    with pytest.raises(trueup.InputError, match="no option `hgih`"):
+        env.reset(seed=0, options={"hgih": 0.1})
+    with pytest.raises(trueup.InputError, match="texts for names"):
+        env.reset(seed=0, options={3: 0.1})
+    with pytest.raises(trueup.InputError, match="did you mean|there are"):
+        envs.make("trueup/CartPol-v0")
+    with pytest.raises(trueup.InputError, match="nothing to render"):
+        envs.make(CART_POLE, render_mode="human")
+    with pytest.raises(trueup.InputError, match="no `id`"):
+        envs.from_config({})
+    assert envs.from_config({"id": CART_POLE}).reset(seed=1)[0].tobytes() == envs.make(CART_POLE).reset(seed=1)[0].tobytes()
+
+
+def test_a_snapshot_of_another_environment_is_refused():
+    others = [identity for identity in IDS if identity != CART_POLE]
+    if not others:
+        pytest.skip("there is one environment")
+    env, other = envs.make(CART_POLE), envs.make(others[0])
+    with pytest.raises(trueup.InputError, match="snapshot"):
+        env.restore(other.snapshot())
+
+
+def test_whatever_the_interface_is_given_it_answers_or_raises():
+    """Random calls with random arguments: an exception is fine, a crash or a hang is not, and what is good still works after."""
+    rng = np.random.default_rng(1)
+    things = [
+        None,
+        0,
+        1,
+        -1,
+        2**70,
+        -(2**70),
+        0.5,
+        float("nan"),
+        "",
+        "x" * 1000,
+        b"x",
+        [],
+        [0],
+        [None],
+        {},
+        {"reset_mask": 1},
+        (),
+        object(),
+        np.array(1),
+        np.zeros(1),
+        np.zeros((3, 4)),
+        np.zeros((3, 4), np.float32),
+        np.array([True, False, True]),
+        np.array(["a"]),
+        np.zeros(3, np.int64),
+        np.zeros((3, 4), np.float32)[:, ::2],
+        np.zeros(0),
+        np.datetime64("2020-01-01"),
+        int,
+        lambda: 0,
+        complex(1, 1),
+    ]
+    single, vector = envs.make(CART_POLE), envs.make_vec(CART_POLE, 3)
+    for _ in range(4000):
+        env = single if rng.random() < 0.5 else vector
+        method = [
+            "reset",
+            "step",
+            "step_into",
+            "restore",
+            "branch_lane",
+            "_lanes.step",
+            "_lanes.reset",
+            "_lanes.copy_lane",
+            "make",
+        ][rng.integers(9)]
+        arguments = [things[k] for k in rng.integers(len(things), size=rng.integers(0, 7))]
+        keywords = {name: things[rng.integers(len(things))] for name in ("seed", "options", "num_envs", "threads") if rng.random() < 0.3}
+        call = envs.make_vec if method == "make" else env
+        for part in () if method == "make" else method.split("."):
+            call = getattr(call, part, None)
+        if call is None or keywords.get("num_envs") in (2**70,) and method == "make":
+            continue
+        try:
+            call(*arguments, **keywords)
+        except Exception as error:
+            assert not isinstance(error, trueup.BugError), (method, arguments, keywords, error)
+    assert len(played(single, 10, seed=1)) > 10
+    assert vector.reset(seed=1)[0].shape == (3, 4)

@@ -1,0 +1,257 @@
+//! What happens to one lane of laws that are under way in many: its parameters change, it begins anew, it goes on as another.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+
+use rand::TryRng;
+
+use super::Seed;
+use super::randomize::mixed;
+
+/// A change of one lane. A law shows it everything it keeps by lanes, once each.
+#[derive(Debug, Clone, Copy)]
+pub enum LaneChange<'a> {
+    /// The parameters have these values from now on, in the order of the law's form; what is remembered stays.
+    Retune {
+        /// The lane.
+        lane: usize,
+        /// The values.
+        values: &'a [f64],
+    },
+    /// All is forgotten, as at the start of a run, and what is drawn from now on is this seed's.
+    Forget {
+        /// The lane.
+        lane: usize,
+        /// What its draws depend on.
+        seed: Seed,
+    },
+    /// Nothing changes, and all that is kept is put into the image: parameters, memory and draws.
+    Save {
+        /// The lane.
+        lane: usize,
+        /// The image.
+        image: &'a LaneImage,
+    },
+    /// The lane goes on as the one that was saved into the image.
+    Load {
+        /// The lane.
+        lane: usize,
+        /// The image.
+        image: &'a LaneImage,
+    },
+}
+
+/// All that is kept of one lane, in the order in which laws show it.
+#[derive(Debug, Default)]
+pub struct LaneImage(RefCell<VecDeque<Box<dyn Any + Send>>>);
+
+impl LaneImage {
+    fn save<T: Clone + Send + 'static>(&self, column: &[T], lane: usize) {
+        if let Some(own) = column.get(lane) {
+            self.0.borrow_mut().push_back(Box::new(own.clone()));
+        }
+    }
+
+    fn load<T: Clone + Send + 'static>(&self, column: &mut [T], lane: usize) {
+        if let Some(own) = column.get_mut(lane)
+            && let Some(kept) = self.0.borrow_mut().pop_front()
+            && let Ok(kept) = kept.downcast::<T>()
+        {
+            *own = *kept;
+        }
+    }
+}
+
+impl LaneChange<'_> {
+    /// `column` has the parameter numbered `parameter` of each lane.
+    pub fn parameter(&self, parameter: usize, column: &mut [f64]) {
+        self.derived(column, |values| values[parameter]);
+    }
+
+    /// `column` has what follows from the parameters of each lane, by `of`.
+    pub fn derived<T: Clone + Send + 'static>(&self, column: &mut [T], of: impl FnOnce(&[f64]) -> T) {
+        match *self {
+            Self::Retune { lane, values } => {
+                if let Some(own) = column.get_mut(lane) {
+                    *own = of(values);
+                }
+            }
+            Self::Forget { .. } => {}
+            Self::Save { lane, image } => image.save(column, lane),
+            Self::Load { lane, image } => image.load(column, lane),
+        }
+    }
+
+    /// `column` has what is remembered of each lane; the default is nothing.
+    pub fn memory<T: Clone + Default + Send + 'static>(&self, column: &mut [T]) {
+        match *self {
+            Self::Retune { .. } => {}
+            Self::Forget { lane, .. } => {
+                if let Some(own) = column.get_mut(lane) {
+                    *own = T::default();
+                }
+            }
+            Self::Save { lane, image } => image.save(column, lane),
+            Self::Load { lane, image } => image.load(column, lane),
+        }
+    }
+
+    /// What each lane draws from.
+    pub fn draws(&self, draws: &mut LaneDraws) {
+        match *self {
+            Self::Retune { .. } => {}
+            Self::Forget { lane, seed } => {
+                if let Some(own) = draws.lanes.get_mut(lane) {
+                    *own = Counter::new(seed, draws.key);
+                }
+            }
+            Self::Save { lane, image } => image.save(&draws.lanes, lane),
+            Self::Load { lane, image } => image.load(&mut draws.lanes, lane),
+        }
+    }
+}
+
+/// Draws of each lane by itself, for laws whose lanes are environments of their own.
+#[derive(Debug, Clone)]
+pub struct LaneDraws {
+    key: u64,
+    lanes: Vec<Counter>,
+}
+
+impl LaneDraws {
+    /// Those of the stream called `name`, for so many lanes, none of which has begun.
+    #[must_use]
+    pub fn new(name: &str, lanes: usize) -> Self {
+        let key = Seed(0).child(name).0;
+        Self { key, lanes: vec![Counter::new(Seed(0), key); lanes] }
+    }
+
+    /// The draws of lane `lane`.
+    ///
+    /// # Panics
+    /// If there is no such lane: an error of the calling code, not of any input.
+    pub fn lane(&mut self, lane: usize) -> &mut Counter {
+        &mut self.lanes[lane]
+    }
+}
+
+/// A generator whose state is a number that counts up: 8 bytes a lane, and nothing to set up when an episode begins, where the
+/// streams of a [`Seed`] take more than a step of most environments.
+///
+/// Source: SplitMix64, Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014, with Stafford's
+/// mixing constants 13.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counter(u64);
+
+/// The odd number nearest to 2^64 over the golden ratio.
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+impl Counter {
+    /// The draws of `seed` under the name whose key is `key`.
+    #[must_use]
+    pub const fn new(seed: Seed, key: u64) -> Self {
+        Self(mixed(mixed(seed.0.wrapping_add(GOLDEN)) ^ key))
+    }
+
+    /// The next 64 bits.
+    #[inline]
+    pub const fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(GOLDEN);
+        mixed(self.0)
+    }
+
+    /// The next number from 0 to below 1, one of 2^53 evenly apart.
+    #[inline]
+    pub const fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
+    }
+}
+
+impl TryRng for Counter {
+    type Error = Infallible;
+
+    #[inline]
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        Ok((self.bits() >> 32) as u32)
+    }
+
+    #[inline]
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        Ok(self.bits())
+    }
+
+    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+        for chunk in bytes.chunks_mut(8) {
+            chunk.copy_from_slice(&self.bits().to_le_bytes()[..chunk.len()]);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn each_change_concerns_its_lane_and_what_it_is_of() {
+        let mut parameters = vec![1.0, 2.0, 3.0];
+        let mut memory = vec![Some(7), None, Some(9)];
+        let retune = LaneChange::Retune { lane: 1, values: &[4.0, 5.0] };
+        retune.parameter(1, &mut parameters);
+        retune.memory(&mut memory);
+        assert_eq!((&parameters[..], &memory[..]), (&[1.0, 5.0, 3.0][..], &[Some(7), None, Some(9)][..]));
+        let forget = LaneChange::Forget { lane: 0, seed: Seed(1) };
+        forget.parameter(0, &mut parameters);
+        forget.memory(&mut memory);
+        assert_eq!((&parameters[..], &memory[..]), (&[1.0, 5.0, 3.0][..], &[None, None, Some(9)][..]));
+        let image = LaneImage::default();
+        for copy in [LaneChange::Save { lane: 2, image: &image }, LaneChange::Load { lane: 0, image: &image }] {
+            copy.parameter(0, &mut parameters);
+            copy.memory(&mut memory);
+        }
+        assert_eq!((&parameters[..], &memory[..]), (&[3.0, 5.0, 3.0][..], &[Some(9), None, Some(9)][..]));
+    }
+
+    #[test]
+    fn draws_are_those_of_the_seed_and_the_name_and_go_on_in_a_copy() {
+        let mut draws = LaneDraws::new("noise", 3);
+        LaneChange::Forget { lane: 1, seed: Seed(5) }.draws(&mut draws);
+        let first = draws.lane(1).bits();
+        let image = LaneImage::default();
+        LaneChange::Save { lane: 1, image: &image }.draws(&mut draws);
+        LaneChange::Load { lane: 2, image: &image }.draws(&mut draws);
+        assert_eq!(draws.lane(1).bits(), draws.lane(2).bits());
+        LaneChange::Forget { lane: 2, seed: Seed(5) }.draws(&mut draws);
+        assert_eq!(draws.lane(2).bits(), first);
+        let mut other = LaneDraws::new("dropout", 1);
+        LaneChange::Forget { lane: 0, seed: Seed(5) }.draws(&mut other);
+        assert_ne!(other.lane(0).bits(), first);
+        LaneChange::Forget { lane: 0, seed: Seed(6) }.draws(&mut draws);
+        assert_ne!(draws.lane(0).bits(), first);
+    }
+
+    /// Of seeds that follow one another, as environments have them: the first draws of each, and all of one.
+    #[test]
+    fn draws_are_even_along_a_stream_and_across_seeds() {
+        let n = 100_000;
+        let along: Vec<f64> = {
+            let mut counter = Counter::new(Seed(3), 17);
+            (0..n).map(|_| StandardNormal.sample(&mut counter)).collect()
+        };
+        let across: Vec<f64> = (0..n).map(|seed| StandardNormal.sample(&mut Counter::new(Seed(seed), 17))).collect();
+        for normal in [along, across] {
+            let moment = |k: i32| normal.iter().map(|z: &f64| z.powi(k)).sum::<f64>() / n as f64;
+            // Four standard errors each.
+            assert!(moment(1).abs() < 4.0 / (n as f64).sqrt());
+            assert!((moment(2) - 1.0).abs() < 4.0 * (2.0 / n as f64).sqrt());
+            assert!((moment(4) - 3.0).abs() < 4.0 * (96.0 / n as f64).sqrt());
+            let neighbours = normal.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n as f64;
+            assert!(neighbours.abs() < 4.0 / (n as f64).sqrt());
+        }
+        let mut counter = Counter::new(Seed(3), 17);
+        assert!((0..1_000).all(|_| (0.0..1.0).contains(&counter.unit())));
+    }
+}
