@@ -1,7 +1,7 @@
 //! Lanes of an assembly, each a run of its own.
 
 use trueup::robot::{Axis, Joint, MECHANISMS, Motion, Signal};
-use trueup::sim2real::{Assembly, LaneRun, LoopIsClosed, Mechanism, Parameter, Pid, Seed, Ticks};
+use trueup::sim2real::{Assembly, LaneRun, LoopIsClosed, Parameter, Pid, Seed, Ticks};
 
 fn joint() -> Assembly<Joint> {
     Assembly::new(Joint::new(Axis::Rotary, [0.1, 0.2, 0.0, 1.0], [0.0; 4]), MECHANISMS)

@@ -62,7 +62,7 @@ impl MarketSetup {
         let value = |what, value, hint| Err(MarketEnvError::Value { what, value, hint });
         match self.pace {
             Pace::Events(0) => return value("the pace in events", 0.0, "a step is taken every so many events, at least 1"),
-            Pace::Seconds(s) if !(s >= 1e-9 && s <= 1e9) => {
+            Pace::Seconds(s) if !(1e-9..=1e9).contains(&s) => {
                 return value("the pace in seconds", s, "a step is taken every so many seconds, from 1e-9 to 1e9");
             }
             _ => {}

@@ -148,7 +148,7 @@ mod tests {
         for lane in 0..50 {
             for (step, row) in all.iter().enumerate() {
                 let age = step + 1 - row[lane] as usize;
-                assert!(age <= 4 && (age >= 1), "{age}");
+                assert!((1..=4).contains(&age), "{age}");
                 assert!(step == 0 || row[lane] >= all[step - 1][lane]);
                 if step >= 4 {
                     ages[age] += 1;
@@ -169,7 +169,7 @@ mod tests {
         let all = shown(Latency::steps_between(0, 3).drawn(Redraw::Episode), 40, 5, 10);
         let mut seen = [false; 4];
         for lane in 0..40 {
-            let ages: Vec<usize> = (4..10).map(|step| step + 1 - all[step][lane] as usize).collect();
+            let ages: Vec<usize> = (4..).zip(&all[4..10]).map(|(step, all)| step + 1 - all[lane] as usize).collect();
             assert!(ages.iter().all(|age| *age == ages[0]));
             seen[ages[0]] = true;
         }

@@ -302,6 +302,7 @@ const FASTEST: f64 = 1e4;
 
 /// One step of Euler's method of all lanes of a block.
 #[inline(always)]
+#[expect(clippy::manual_clamp, reason = "a clamp keeps what is no number, and is no single instruction")]
 fn advance(state: &mut State, own: &Constants, force: &Row, step: f64) {
     let (sin, cos) = sines(&state.angle);
     for k in 0..BLOCK {
