@@ -21,6 +21,10 @@ use super::output_folder::Overwrite;
 /// The version of Minari whose form is written.
 const VERSION: &str = "0.5.4";
 
+/// The most rows of an episode that Minari reads as one: a batch of pyarrow's scanner. Of a longer one it would take the rest for
+/// the next episode.
+const MOST_ROWS: usize = 131_072;
+
 /// Writes episodes as the data set `id` (as `trueup/cartpole/expert-v0`) into the folder `root/id`, whole or not at all. Minari finds
 /// it by its id where `root` is its folder of data sets (`MINARI_DATASETS_PATH`).
 ///
@@ -28,7 +32,7 @@ const VERSION: &str = "0.5.4";
 /// holds `lane_seed` and `lane_episode`.
 ///
 /// # Errors
-/// An id Minari does not take; episodes that do not fit together, or are none; a data set that exists, unless writing over is
+/// An id Minari does not take; episodes that do not fit together, or are none; one of more than 131,071 steps; a data set that exists, unless writing over is
 /// forced; a place where nothing can be written.
 pub fn write_minari(root: &Path, id: &str, file: &EpisodeFile<'_>, overwrite: Overwrite) -> Result<(), InputError> {
     let folder = root.join(id);
@@ -38,6 +42,12 @@ pub fn write_minari(root: &Path, id: &str, file: &EpisodeFile<'_>, overwrite: Ov
         return Err(
             InputError::new(&folder, "there is no episode to be written").hint("record one to its end, or cut it off")
         );
+    }
+    if let Some(k) = file.episodes.iter().position(|one| one.rewards.len() >= MOST_ROWS) {
+        let message = format!("Minari reads no more than {} steps of an episode", MOST_ROWS - 1);
+        return Err(InputError::new(&folder, message)
+            .found(format!("{} steps of episode {k}", file.episodes[k].rewards.len()))
+            .hint("put a limit of time around the environment, or write a table"));
     }
     if folder.exists() && overwrite == Overwrite::Refuse {
         return Err(InputError::new(&folder, "the data set exists already, and nothing is written over unasked")
