@@ -3,7 +3,10 @@
 
 use serde::Deserialize;
 use trueup::rl::{Actions, Buffers, EnvError, Options, Space, Threads, VecEnv, Which, check_env};
-use trueup::robot::ENVIRONMENTS;
+use trueup::robot::env::{Randomization, cart_pole_env};
+use trueup::robot::{CART_POLE_MECHANISMS, CartPole, ENVIRONMENTS, Integration};
+use trueup::sim2real::randomize::{Distribution, Level, Randomized, Randomizer, Redraw, Target};
+use trueup::sim2real::{Assembly, Mechanism, Simulator};
 
 const CART_POLE: &str = "trueup/CartPole-v0";
 const PENDULUM: &str = "trueup/Pendulum-v0";
@@ -228,6 +231,59 @@ fn they_keep_it_with_mechanisms_and_whatever_is_drawn() {
             assert!(report.findings.is_empty(), "{text}\n{report}");
         }
     }
+}
+
+/// Cart-poles with a delay and noise, the delay and gravity drawn at random; `more` has another mechanism, which does nothing.
+fn wired(more: bool) -> Box<dyn VecEnv> {
+    let plant = CartPole::new([1.0, 0.1, 0.5, 9.8, 0.0, 0.0, 10.0], [0.0; 7]);
+    let mut assembly = Assembly::new(plant.integrated(Integration::Euler { step: 0.02 }), CART_POLE_MECHANISMS);
+    for (id, value) in [("command_delay", 0.03), ("noise", 0.01), ("coulomb_friction", 0.0)] {
+        let mechanism: &'static dyn Mechanism<CartPole> =
+            *CART_POLE_MECHANISMS.iter().find(|row| row.about().name == id).unwrap();
+        let mut parameters = mechanism.forms(&Default::default())[0].parameters.clone();
+        parameters[0].nominal = value;
+        if more || id != "coulomb_friction" {
+            assembly = assembly.with_mechanism(mechanism, 0, parameters);
+        }
+    }
+    let drawn = |place: usize, target: Target, low: f64, high: f64| Randomized {
+        target,
+        parameter: assembly.parameters()[place].clone(),
+        distribution: Distribution::Uniform { low, high },
+        relative: false,
+        at: Redraw::Reset,
+    };
+    let randomized =
+        vec![drawn(3, Target::own("gravity"), 9.0, 11.0), drawn(7, Target::of("command_delay", "seconds"), 0.0, 0.1)];
+    let randomizer = Randomizer::new(randomized, Vec::new()).unwrap();
+    let randomization = Randomization { randomizer, places: vec![3, 7], level: Level::FULL, regime_seconds: 1.0 };
+    cart_pole_env(13, assembly, Some(randomization), &Options::new().with("sutton_barto_reward", true)).unwrap()
+}
+
+/// What is written for the task alone does what the laws do.
+#[test]
+fn blocks_of_lanes_do_what_the_mechanisms_do() {
+    let (mut fast, mut whole) = (wired(false), wired(true));
+    let (mut one, mut other) = (Buffers::of(&*fast), Buffers::of(&*whole));
+    let seeds: Vec<u64> = (0..13).collect();
+    fast.reset(Which::All, Some(&seeds), &Options::new(), &mut one.observations).unwrap();
+    whole.reset(Which::All, Some(&seeds), &Options::new(), &mut other.observations).unwrap();
+    let mut ended = 0;
+    for k in 0..400_usize {
+        let apart = one.observations.iter().zip(&other.observations).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f32::max) < 1e-6, "step {k}");
+        let actions: Vec<i64> = (0..13).map(|lane| ((k * (lane + 3)) / 4 % 2) as i64).collect();
+        fast.step(Actions::Discrete(&actions), &mut one.out()).unwrap();
+        whole.step(Actions::Discrete(&actions), &mut other.out()).unwrap();
+        assert_eq!((&one.terminated, &one.truncated, &one.rewards), (&other.terminated, &other.truncated, &other.rewards));
+        let over = one.terminated.clone();
+        if over.contains(&true) {
+            ended += over.iter().filter(|over| **over).count();
+            fast.reset(Which::Mask(&over), None, &Options::new(), &mut one.observations).unwrap();
+            whole.reset(Which::Mask(&over), None, &Options::new(), &mut other.observations).unwrap();
+        }
+    }
+    assert!(ended > 50, "{ended} episodes");
 }
 
 #[test]

@@ -127,8 +127,13 @@ where
     fn begin_at(&self, run: &mut LaneRun<P>, row: usize, first: usize, lane: usize, values: &[f64]) {
         if row == first {
             let dynamics = self.assembly.plant().dynamics(&Thetas::single(values).block(0, self.assembly.own().len()));
-            if let Some(state) = super::Dynamics::initial(&dynamics, &Thetas::single(&self.initial)).pop() {
+            let Some(state) = super::Dynamics::initial(&dynamics, &Thetas::single(&self.initial)).pop() else { return };
+            if row == 0 {
                 run.begin(lane, values, state, Seed(9));
+            } else if let Ok(mut first) = LaneRun::new(&self.assembly, 1, &self.initial) {
+                // As environments do it: in a run that has never taken a step.
+                first.begin(0, values, state, Seed(9));
+                run.adopt(&mut first, 0, lane);
             }
         }
     }

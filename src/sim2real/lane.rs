@@ -65,6 +65,15 @@ impl LaneImage {
 }
 
 impl LaneChange<'_> {
+    /// The lane whose parameters may be others after this change; what follows from them for more than a lane is made anew then.
+    #[must_use]
+    pub const fn retuned(&self) -> Option<usize> {
+        match *self {
+            Self::Retune { lane, .. } | Self::Load { lane, .. } => Some(lane),
+            Self::Forget { .. } | Self::Save { .. } => None,
+        }
+    }
+
     /// `column` has the parameter numbered `parameter` of each lane.
     pub fn parameter(&self, parameter: usize, column: &mut [f64]) {
         self.derived(column, |values| values[parameter]);

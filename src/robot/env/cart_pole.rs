@@ -308,7 +308,6 @@ impl VecEnv for Fast {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rl::Buffers;
     use crate::sim2real::randomize::{Distribution, Level, Randomized, Randomizer, Target};
 
     /// With a delay, noise, and gravity and the delay drawn at random.
@@ -333,41 +332,6 @@ mod tests {
         let randomizer = Randomizer::new(randomized, Vec::new()).unwrap();
         let randomization = Randomization { randomizer, places: vec![3, 7], level: Level::FULL, regime_seconds: 1.0 };
         Setting { assembly, randomization: Some(randomization) }
-    }
-
-    /// What is written for the task alone does what the laws do.
-    #[test]
-    fn blocks_of_lanes_do_what_the_mechanisms_do() {
-        let task = Balance { thresholds: THRESHOLDS, sutton_barto: true };
-        let timing = Timing { seconds: STEP, max_steps: 500 };
-        let wires = wires(&setting()).unwrap();
-        let mut fast: Box<dyn VecEnv> = Box::new(Fast::new(13, about(), task, setting(), wires, timing));
-        let Setting { assembly, randomization } = setting();
-        let whole = Simulated::new(task, about(), &assembly, randomization, timing, (13, &[0.0; 4])).unwrap();
-        let mut whole: Box<dyn VecEnv> = Box::new(whole);
-        let (mut one, mut other) = (Buffers::new(13, 4), Buffers::new(13, 4));
-        let seeds: Vec<u64> = (0..13).collect();
-        fast.reset(Which::All, Some(&seeds), &Options::new(), &mut one.observations).unwrap();
-        whole.reset(Which::All, Some(&seeds), &Options::new(), &mut other.observations).unwrap();
-        let mut ended = 0;
-        for k in 0..400_usize {
-            let apart = one.observations.iter().zip(&other.observations).map(|(a, b)| (a - b).abs());
-            assert!(apart.fold(0.0, f32::max) < 1e-6, "step {k}");
-            let actions: Vec<i64> = (0..13).map(|lane| ((k * (lane + 3)) / 4 % 2) as i64).collect();
-            fast.step(Actions::Discrete(&actions), &mut one.out()).unwrap();
-            whole.step(Actions::Discrete(&actions), &mut other.out()).unwrap();
-            assert_eq!(
-                (&one.terminated, &one.truncated, &one.rewards),
-                (&other.terminated, &other.truncated, &other.rewards)
-            );
-            let over = one.terminated.clone();
-            if over.contains(&true) {
-                ended += over.iter().filter(|over| **over).count();
-                fast.reset(Which::Mask(&over), None, &Options::new(), &mut one.observations).unwrap();
-                whole.reset(Which::Mask(&over), None, &Options::new(), &mut other.observations).unwrap();
-            }
-        }
-        assert!(ended > 50, "{ended} episodes");
     }
 
     #[test]

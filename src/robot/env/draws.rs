@@ -203,10 +203,10 @@ impl LaneParameters {
             Some(other) => self.values[to * rows..][..rows].copy_from_slice(&other.values[from * rows..][..rows]),
             None => self.values.copy_within(from * rows..(from + 1) * rows, to * rows),
         }
-        self.keys[to] = other.map_or(self.keys[from], |other| other.keys[from]);
-        self.levels[to] = other.map_or(self.levels[from], |other| other.levels[from]);
+        self.keys[to] = other.map_or_else(|| self.keys[from], |other| other.keys[from]);
+        self.levels[to] = other.map_or_else(|| self.levels[from], |other| other.levels[from]);
         for (k, group) in self.groups.iter_mut().enumerate() {
-            group.drawn[to] = other.map_or(group.drawn[from], |other| other.groups[k].drawn[from]);
+            group.drawn[to] = other.map_or_else(|| group.drawn[from], |other| other.groups[k].drawn[from]);
         }
         if self.regimes.count > 0 {
             let source = other.map_or(&self.regimes, |other| &other.regimes);

@@ -18,6 +18,8 @@ pub(super) const TITLE: &str = "swing a rod up and keep it upright by a torque t
 const STEP: f64 = 0.05;
 const TOP_SPEED: f64 = 8.0;
 const TORQUE: f64 = 2.0;
+/// One over the inertia of a rod of 1 kg and 1 m [1/(kg m^2)].
+const PER_TORQUE: f32 = 3.0;
 /// Names the stream of states at the start.
 const START: StreamName = StreamName::new("start");
 
@@ -37,7 +39,8 @@ impl Task for SwingUp {
 
     fn act(&mut self, lane: usize, state: &Motion, action: f64, _: f64) -> f64 {
         self.rewards[lane] = reward(state.position, state.velocity, action);
-        action
+        // Of single precision, as `Rates` has it.
+        f64::from(PER_TORQUE * action as f32) / f64::from(PER_TORQUE)
     }
 
     fn judge(&mut self, lane: usize, _: &Motion, _: f64) -> (f64, bool) {
@@ -53,7 +56,7 @@ impl Task for SwingUp {
     }
 
     fn copy(&mut self, other: Option<&Self>, from: usize, to: usize) {
-        self.rewards[to] = other.map_or(self.rewards[from], |other| other.rewards[from]);
+        self.rewards[to] = other.map_or_else(|| self.rewards[from], |other| other.rewards[from]);
     }
 }
 
@@ -131,7 +134,7 @@ pub fn pendulum_env(
     if plain && randomization.is_none() && assembly.mechanisms().next().is_none() {
         (about.seconds_a_step, about.max_steps) = (Some(STEP), Some(max_steps));
         let [mass, length, gravity] = [values[0], values[1], values[2]];
-        let torque = 3.0 / (mass * length * length);
+        let torque = (f64::from(PER_TORQUE) / (mass * length * length)) as f32;
         let rates = Rates { gravity: 1.5 * gravity / length, torque, step: STEP, top_speed: TOP_SPEED };
         return Ok(Box::new(Fast { about, lanes: PendulumLanes::new(lanes, rates), episodes: Episodes::new(lanes) }));
     }

@@ -16,8 +16,9 @@ type Row = [f64; BLOCK];
 pub(super) struct Rates {
     /// Of gravity [1/s^2].
     pub gravity: f64,
-    /// Of a torque of 1 N m [1/s^2].
-    pub torque: f64,
+    /// Of a torque of 1 N m [1/s^2]. The product with an action is of single precision, as Gymnasium has it since NumPy 2: in double,
+    /// motions part by 2e-6 within 80 steps.
+    pub torque: f32,
     /// Step [s].
     pub step: f64,
     /// Top speed [rad/s].
@@ -76,14 +77,17 @@ impl PendulumLanes {
         let out = observations.chunks_mut(3 * BLOCK).zip(rewards.chunks_mut(BLOCK));
         let lanes = self.angle.iter_mut().zip(&mut self.spin).zip(actions.chunks(BLOCK)).zip(out);
         for (((angle, spin), given), (observations, rewards)) in lanes {
-            let (mut action, mut gained) = ([0.0; BLOCK], [0.0; BLOCK]);
-            action.iter_mut().zip(given).for_each(|(own, given)| *own = f64::from(*given));
+            let (mut action, mut driven, mut gained) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+            for (k, given) in given.iter().enumerate() {
+                action[k] = f64::from(*given);
+                driven[k] = f64::from(torque * given);
+            }
             let mut sine = *angle;
             sines(&mut sine);
             let (mut cosine, mut seen) = ([0.0; BLOCK], [0.0; BLOCK]);
             for k in 0..BLOCK {
                 gained[k] = reward(angle[k], spin[k], action[k]);
-                let free = spin[k] + (gravity * sine[k] + torque * action[k]) * step;
+                let free = spin[k] + (gravity * sine[k] + driven[k]) * step;
                 spin[k] = free.max(-top_speed).min(top_speed);
                 angle[k] += step * spin[k];
                 cosine[k] = angle[k] + FRAC_PI_2;

@@ -114,7 +114,7 @@ impl Task for Follow {
     }
 
     fn copy(&mut self, other: Option<&Self>, from: usize, to: usize) {
-        self.lanes[to] = other.map_or(self.lanes[from], |other| other.lanes[from]);
+        self.lanes[to] = other.map_or_else(|| self.lanes[from], |other| other.lanes[from]);
     }
 }
 

@@ -65,6 +65,8 @@ where
     ends: Vec<Option<<T::Plant as Plant>::State>>,
     times: Vec<f64>,
     commands: Vec<Signal>,
+    /// The commands as they last arrived, 0 before the first.
+    arriving: Vec<f64>,
     /// A run of one lane, in which lanes begin.
     first: LaneRun<T::Plant>,
 }
@@ -105,6 +107,7 @@ where
             ends,
             times: vec![0.0; lanes],
             commands: vec![Signal(0.0); lanes],
+            arriving: vec![0.0; lanes],
             first,
         })
     }
@@ -129,6 +132,7 @@ where
             times.for_each(|(time, done)| *time = (*done as usize * substeps + part) as f64 * step);
             self.run.step(Ticks { step, times: &self.times }, &self.commands);
         }
+        self.arriving.iter_mut().zip(self.run.arriving()).for_each(|(own, signal)| *own = signal.0);
         for (lane, done) in self.steps.iter_mut().enumerate() {
             *done = done.saturating_add(1);
             self.times[lane] = (*done as usize * substeps) as f64 * step;
@@ -233,6 +237,7 @@ where
             self.first.observe(&[0.0]);
             self.run.adopt(&mut self.first, 0, lane);
             (self.steps[lane], self.ends[lane], self.times[lane]) = (0, None, 0.0);
+            self.arriving[lane] = 0.0;
             let told = self.told(lane);
             let row = &mut observations[lane * size..][..size];
             self.task.observe(lane, &self.run.observations()[lane], told, row);
@@ -267,10 +272,9 @@ where
         let regime = self.parameters.regimes() > 0 && channel + 1 == self.about.info.len();
         let states = self.run.states();
         for (lane, value) in values.iter_mut().enumerate() {
-            let arriving = self.run.arriving().get(lane).map_or(0.0, |signal| signal.0);
             *value = match regime {
                 true => self.parameters.regime(lane),
-                false => self.task.info(lane, channel, &states[lane], arriving),
+                false => self.task.info(lane, channel, &states[lane], self.arriving[lane]),
             };
         }
     }
@@ -285,7 +289,7 @@ where
         self.parameters.copy(None, from, to);
         copy_episode(&mut self.episodes, None, from, to);
         self.ends[to] = self.ends[from].clone();
-        (self.steps[to], self.times[to]) = (self.steps[from], self.times[from]);
+        (self.steps[to], self.times[to], self.arriving[to]) = (self.steps[from], self.times[from], self.arriving[from]);
     }
 
     fn copy_lane_from(&mut self, other: &dyn VecEnv, from: usize, to: usize) -> Result<(), EnvError> {
@@ -299,7 +303,7 @@ where
         self.parameters.copy(Some(&other.parameters), from, to);
         copy_episode(&mut self.episodes, Some(&other.episodes), from, to);
         self.ends[to] = other.ends[from].clone();
-        (self.steps[to], self.times[to]) = (other.steps[from], other.times[from]);
+        (self.steps[to], self.times[to], self.arriving[to]) = (other.steps[from], other.times[from], other.arriving[from]);
         Ok(())
     }
 }

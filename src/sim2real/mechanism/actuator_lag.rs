@@ -86,9 +86,9 @@ where
 impl Lag {
     /// Changes a lane, whose time constant follows from its parameters by `of`.
     fn change_by(&mut self, change: &LaneChange<'_>, of: impl Fn(&[f64]) -> f64) {
-        change.derived(&mut self.time_constant, &of);
+        change.derived(&mut self.time_constant, of);
         change.memory(&mut self.follower);
-        self.decay.change(change, of);
+        self.decay.change(change, &self.time_constant);
     }
 }
 

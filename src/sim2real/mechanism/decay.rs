@@ -22,10 +22,13 @@ impl Decay {
         &self.gained
     }
 
-    /// Changes a lane, whose time constant [s] follows from its parameters by `time_constant`.
-    pub(super) fn change(&mut self, change: &LaneChange<'_>, time_constant: impl FnOnce(&[f64]) -> f64) {
-        let step = self.step;
-        change.derived(&mut self.gained, |values| gained(step, time_constant(values)));
+    /// Follows a change of the time constants [s], which has been made: what is kept here is no lane's own.
+    pub(super) fn change(&mut self, change: &LaneChange<'_>, time_constant: &[f64]) {
+        if let Some(lane) = change.retuned()
+            && let Some(own) = self.gained.get_mut(lane)
+        {
+            *own = gained(self.step, time_constant[lane]);
+        }
     }
 }
 

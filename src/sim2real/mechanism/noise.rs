@@ -96,7 +96,7 @@ where
         change.parameter(0, &mut self.std);
         if self.coloured {
             change.parameter(1, &mut self.correlation_time);
-            self.decay.change(change, |values| values[1]);
+            self.decay.change(change, &self.correlation_time);
         }
         change.memory(&mut self.value);
         change.memory(&mut self.own);

@@ -80,7 +80,7 @@ impl Heat {
         change.parameter(0, &mut self.strength);
         change.parameter(1, &mut self.time_constant);
         change.memory(&mut self.lost);
-        self.decay.change(change, |values| values[1]);
+        self.decay.change(change, &self.time_constant);
     }
 
     /// Takes up what the commands leave in the tick, and gives each the gain that the mean heat over the tick leaves it.
