@@ -166,7 +166,8 @@ impl<'p> PaperSession<'p> {
         }
         self.tell()?;
         let (mut told, run, log) = (self.told, self.run, Arc::clone(&self.log));
-        let (events, instruments) = (self.session.events(), self.session.setup.instruments());
+        let (events, setup) = (self.session.events(), Arc::clone(&self.session.setup));
+        let instruments = setup.instruments();
         let record = self.session.finish().map_err(|error| explained(run, &error))?;
         let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
         log.outcome(told.news(&record.blotter, instruments, events))?;
