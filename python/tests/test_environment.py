@@ -313,7 +313,7 @@ def test_whatever_the_interface_is_given_it_answers_or_raises():
         call = envs.make_vec if method == "make" else env
         for part in () if method == "make" else method.split("."):
             call = getattr(call, part, None)
-        if call is None or keywords.get("num_envs") in (2**70,) and method == "make":
+        if call is None:
             continue
         try:
             call(*arguments, **keywords)

@@ -126,7 +126,7 @@ def test_snapshots_branches_and_lanes_that_are_copied(identity, mode):
 
 
 def test_what_is_pickled_is_fresh_and_made_alike():
-    env = gymnasium.make_vec(CART_POLE, 4, vector_kwargs={"autoreset_mode": "SameStep"})
+    env = gymnasium.make_vec(CART_POLE, 4, autoreset_mode="SameStep")
     assert isinstance(env, envs.VectorEnvironment) and env.spec.id == CART_POLE
     env.reset(seed=1)
     again = pickle.loads(pickle.dumps(env))

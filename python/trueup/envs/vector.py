@@ -99,6 +99,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv):
             if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
                 found = f"{mask.dtype} {mask.shape}" if isinstance(mask, np.ndarray) else type(mask).__name__
                 raise _wrong(f"options['reset_mask'] is {found}", f"a bool array of the shape ({self.num_envs},)")
+            if not mask.any():
+                raise _wrong(f"options['reset_mask'] selects none of the {self.num_envs} lanes", "select at least one, or do not reset")
             mask = np.ascontiguousarray(mask)
         of_lanes = seeds.of_lanes(seed, self.num_envs)
         if isinstance(seed, (int, np.integer)):
