@@ -28,7 +28,6 @@ struct Waiting {
     number: usize,
     side: Side,
     limit: i64,
-    quantity: f64,
     left: f64,
     ahead: f64,
     until: usize,
@@ -117,7 +116,7 @@ fn log(times: f64, per_share: f64, seed: u64) -> Recording<OrderLog> {
             let (number, quantity) = (written.orders.len(), draws.between(20.0, 90.0).round());
             let chance = draws.between(0.8, 1.2);
             let (ahead, until) = ((displayed * (1.0 + (times - 1.0) * chance)).round(), round + PATIENCE);
-            written.waiting = Some(Waiting { number, side, limit, quantity, left: quantity, ahead, until });
+            written.waiting = Some(Waiting { number, side, limit, left: quantity, ahead, until });
             written.orders.push(LoggedOrder {
                 id: number.to_string(),
                 side,

@@ -1,6 +1,6 @@
 //! Episodes that were recorded, as files.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it fails")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may stop where it fails")]
 #![cfg(feature = "io")]
 
 use std::fs;
