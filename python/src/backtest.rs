@@ -199,13 +199,13 @@ impl From<BacktestError> for Unable {
     }
 }
 
-/// Audits the strategies that `make()` gives, on the data of the RUN.toml at `path`; gives the audit as JSON.
+/// Audits the strategies that `make()` gives, or those that the RUN.toml at `path` names, on its data; gives the audit as JSON.
 #[pyfunction]
-#[pyo3(signature = (path, make, cuts=30, seed=1, progress=None))]
+#[pyo3(signature = (path, make=None, cuts=30, seed=1, progress=None))]
 pub fn audit_with(
     py: Python<'_>,
     path: PathBuf,
-    make: Py<PyAny>,
+    make: Option<Py<PyAny>>,
     cuts: usize,
     seed: u64,
     progress: Option<Py<PyAny>>,
@@ -216,6 +216,12 @@ pub fn audit_with(
         let listener = course.listener(progress);
         let raised = Raised::default();
         let made = |_: &[History]| -> Result<Box<dyn Strategy>, Unable> {
+            // Before a run and not only after it: work that is ended would else begin every run that is left.
+            course.check();
+            let Some(make) = &make else {
+                return strategy_of_run(&file)
+                    .map_err(|error| Unable::Raised(Python::attach(|py| error::input(py, &error))));
+            };
             Python::attach(|py| {
                 let strategy = make.call0(py).map_err(Unable::Raised)?;
                 let guest = Guest::new(py, strategy, raised.clone()).map_err(Unable::Raised)?;

@@ -136,7 +136,4 @@ def audit(
     seed : int
         Seed of the instants and of the other futures.
     """
-    if strategy is not None:
-        return Audit.of_text(_trueup.audit_with(run, strategy, cuts, seed, progress))
-    text, _ = _trueup.answer(["audit", os.fspath(run), "--json", f"--cuts={cuts}", f"--seed={seed}"], progress)
-    return Audit.of_text(text)
+    return Audit.of_text(_trueup.audit_with(run, strategy, cuts, seed, progress))
