@@ -1,4 +1,4 @@
-//! Random bytes against every reader: `./x fuzz` builds this, and runs each of the [`TARGETS`].
+//! Random bytes against every reader: `./x fuzz` builds this, and runs each of the [`targets`].
 //!
 //! One program holds them all, because trueup is linked once then; `TRUEUP_FUZZ` names the one that runs. A target stops
 //! the process where a reader panics, or where what it read and wrote is not read again the same. libFuzzer itself stops
@@ -6,61 +6,14 @@
 
 #![no_main]
 
-mod account;
-mod columnar;
-mod csv;
-mod equations;
-mod history;
-mod journal;
-mod json_row;
-mod orders;
-mod paper;
-mod paper_log;
-mod run;
-mod scene;
-mod stream;
-mod table;
-mod tape_orders;
-mod trajectory;
-mod twin;
-mod unit;
+mod targets;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::exit;
 use std::sync::{Mutex, OnceLock};
 
 use libfuzzer_sys::fuzz_target;
-use scene::Scene;
-
-/// A target: its name, and what it does with some bytes in a folder of its own.
-type Target = (&'static str, fn(&Scene, &[u8]));
-
-/// The targets, by their names, which are those of their folders in `fuzz/seeds`.
-const TARGETS: [Target; 23] = [
-    ("account", account::target),
-    ("arrow", columnar::arrow),
-    ("chunks", stream::chunks),
-    ("csv", csv::plain),
-    ("equations", equations::target),
-    ("gzip", csv::compressed),
-    ("history", history::target),
-    ("journal", journal::target),
-    ("json_row", json_row::target),
-    ("orders", orders::target),
-    ("paper_json", paper::json),
-    ("paper_log", paper_log::target),
-    ("paper_sqlite", paper::sqlite),
-    ("paper_table", paper::table),
-    ("paper_xml", paper::xml),
-    ("parquet", columnar::parquet),
-    ("run", run::target),
-    ("stream", stream::target),
-    ("tape", history::tape),
-    ("tape_orders", tape_orders::target),
-    ("trajectory", trajectory::target),
-    ("twin", twin::target),
-    ("unit", unit::target),
-];
+use targets::{Scene, TARGETS, Target};
 
 /// Where the last panic was: readers of other crates may panic, as long as ours catch it.
 static PANIC: Mutex<String> = Mutex::new(String::new());

@@ -5,7 +5,7 @@ use std::slice::from_ref;
 use trueup::io::{Document, Need, TwinFile, read_trajectory};
 use trueup::robot::{cart_pole_recordings, equations_recordings, joint_recordings, tanks_recordings};
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 const JOINT: &str = "[twin]\nmodel = 'joint'\n[channels]\ncommand = { column = 'u' }\nposition = { column = 'q' }\n";
 const CART: &str = "[twin]\nmodel = 'cart_pole'\n[channels]\ncommand = { column = 'u' }\nposition = { column = 'q' }\n\

@@ -5,7 +5,7 @@ use trueup::market::tape_orders::{TapeOrder, TapeSettings, TapeSink, TapeSources
 use trueup::market::{Level, Print};
 use trueup::sim2real::Timestamp;
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 /// Holds what is found to what every tape obeys.
 #[derive(Default)]

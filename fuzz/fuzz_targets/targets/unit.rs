@@ -2,7 +2,7 @@
 
 use trueup::io::{check_unit, did_you_mean, hint_among, listed};
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 pub fn target(_: &Scene, bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);

@@ -6,7 +6,7 @@ use trueup::io::{MarketFiles, TwinFile};
 use trueup::market::execution_assembly;
 use trueup::robot::{cart_pole_assembly, equations_assembly, joint_assembly, tanks_assembly};
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 pub fn target(scene: &Scene, bytes: &[u8]) {
     // Files that a twin may name.

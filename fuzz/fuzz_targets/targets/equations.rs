@@ -3,7 +3,7 @@
 use trueup::robot::{Attachment, EquationSystem, Equations, InputVariable, OutputVariable, StateVariable};
 use trueup::sim2real::Parameter;
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 pub fn target(_: &Scene, bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);

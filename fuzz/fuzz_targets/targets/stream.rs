@@ -8,7 +8,7 @@ use trueup::io::{ClockOffset, FeedClock, FeedFormat, FeedRules, Layout, OnBad, R
 use trueup::market::{Dated, FileStream, Stream};
 use trueup::sim2real::Timestamp;
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 /// In every kind of data that the layout has.
 pub fn target(scene: &Scene, bytes: &[u8]) {

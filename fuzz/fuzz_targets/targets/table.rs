@@ -7,7 +7,7 @@ use trueup::io::{
     common_spacing,
 };
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 /// Converts every column of `table` to all it can be, and holds what is read to be read again from each format.
 pub fn every_column(scene: &Scene, table: &Table) {

@@ -2,8 +2,8 @@
 
 use trueup::io::JsonRow;
 
-use crate::scene::{Scene, shown};
-use crate::table::every_column;
+use super::scene::{Scene, shown};
+use super::table::every_column;
 
 pub fn target(scene: &Scene, bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);

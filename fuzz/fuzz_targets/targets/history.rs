@@ -4,7 +4,7 @@ use trueup::io::{FeedFormat, Stamp, TimeFormat, TimeUnit};
 use trueup::market::{History, TapeFiles, read_tape};
 use trueup::sim2real::Timestamp;
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 /// As a backtest reads them.
 pub fn target(scene: &Scene, bytes: &[u8]) {

@@ -2,8 +2,8 @@
 
 use trueup::io::Table;
 
-use crate::scene::{Scene, shown};
-use crate::table::every_column;
+use super::scene::{Scene, shown};
+use super::table::every_column;
 
 pub fn parquet(scene: &Scene, bytes: &[u8]) {
     if let Some(table) = shown(Table::read(scene.write("a.parquet", bytes))) {

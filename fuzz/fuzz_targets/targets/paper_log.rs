@@ -3,7 +3,7 @@
 use trueup::io::{InputError, Journal, JournalLines, JournalSync, RunFile};
 use trueup::market::paper_run::{JournalUse, PaperFeed, PreparedPaper};
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 const RUN: &str = "[run]\nseed = 7\ncash = 1000\ncurrency = \"USD\"\n[[instrument]]\nsymbol = \"XYZ\"\ntick_size = 0.01\nlot_size = 1\n\
 [[data]]\nsymbol = \"XYZ\"\ntrades = \"t.csv\"\n[strategy]\nkind = \"buy_and_hold\"\n";

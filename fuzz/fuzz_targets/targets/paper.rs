@@ -6,7 +6,7 @@ use trueup::io::write_table;
 use trueup::market::paper::import::{ImportSettings, import};
 use trueup::market::paper::{PaperLog, SourcePlace};
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 /// Alpaca, Binance, CCXT, and pages, arrays and lines.
 pub fn json(scene: &Scene, bytes: &[u8]) {

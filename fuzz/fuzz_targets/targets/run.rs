@@ -4,7 +4,7 @@ use trueup::io::RunFile;
 use trueup::market::prepare_run;
 use trueup::strategies::STRATEGIES;
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 const BARS: &[u8] =
     b"ts,open,high,low,close,volume\n2024-03-08T14:30:00Z,10,12,9,11,100\n2024-03-08T14:31:00Z,11,12,10,11,5\n";

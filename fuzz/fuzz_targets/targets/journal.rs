@@ -2,7 +2,7 @@
 
 use trueup::proof::Journal;
 
-use crate::scene::{Scene, shown};
+use super::scene::{Scene, shown};
 
 pub fn target(_: &Scene, bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
