@@ -15,9 +15,9 @@ const OPENAI_DAMPING: &str = "OpenAI et al., arXiv:1808.00177 (2018), table 1: r
 const OPENAI_GRAVITY: &str =
     "OpenAI et al., arXiv:1808.00177 (2018), table 1: gravity vector, each coordinate + N(0, 0.4) m/s^2";
 
-/// Tan et al., "Sim-to-real: learning agile locomotion for quadruped robots", RSS 2018 (arXiv:1804.10332); as the authors
-/// released it, uniform and at every reset: bulletphysics/bullet3 at 3bc08c1, `examples/pybullet/gym/pybullet_envs/minitaur/
-/// envs/env_randomizers/minitaur_env_randomizer_config.py` (all but the inertial unit).
+/// Tan et al., "Sim-to-real: learning agile locomotion for quadruped robots", RSS 2018 (arXiv:1804.10332). As it was released,
+/// uniform and at every reset: bulletphysics/bullet3 at 3bc08c1, `minitaur_env_randomizer_config.py` in
+/// `examples/pybullet/gym/pybullet_envs/minitaur/envs/env_randomizers` (all but the inertial unit).
 const TAN_BIAS: &str = "Tan et al., RSS 2018 (arXiv:1804.10332), table I: IMU bias";
 const TAN_NOISE: &str = "Tan et al., RSS 2018 (arXiv:1804.10332), table I: IMU noise (std)";
 /// From the command to the report of what it did; in the released code a delay of what is observed.
@@ -32,7 +32,7 @@ const HWANGBO: &str =
     "Hwangbo et al., Science Robotics 4 (2019) (arXiv:1901.08652): masses of links U(-15, 15) %, 30 models";
 
 /// Muratore's simulations of Quanser's devices: famura/SimuRLacra at 0572545,
-/// `Pyrado/pyrado/domain_randomization/default_randomizers.py`.
+/// `Pyrado/pyrado/domain_randomization/default_randomizers.py`; drawn at every reset (`DomainRandWrapperLive`).
 const CART_POLE: &str =
     "SimuRLacra (2020), default randomizer of QCartPoleSim: B_eq and B_pole, half span a quarter of nominal";
 const DEAD_VOLTAGE: &str =
@@ -41,7 +41,7 @@ const TORQUE_LIMIT: &str =
     "SimuRLacra (2020), default randomizer of PendulumSim: tau_max, standard deviation a tenth of nominal";
 
 /// isaac-sim/IsaacLab at 17ad46e, `source/isaaclab_assets/isaaclab_assets/robots/spot.py`: `min_delay` 0, `max_delay` 4
-/// physics steps of 2 ms each. There whole steps are drawn, here anything between.
+/// physics steps of 2 ms each, drawn at every reset. There whole steps are drawn, here anything between.
 const SPOT: &str = "Isaac Lab (2026), actuators of Boston Dynamics' Spot: a delay of 0 to 4 steps of 2 ms";
 
 /// mekion/the-bimo-project at 8121d15, `IsaacLab/bimo/actuators/STS3215.py`: `backlash_range_deg` (1.0, 2.4), "measured on
