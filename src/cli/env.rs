@@ -220,13 +220,11 @@ fn table(screen: &Screen, abouts: &[About]) -> String {
 /// Components: names, units and bounds. Of many, the first and the last.
 fn told(space: &BoxSpace) -> String {
     const SHOWN: usize = 8;
-    let bound = |value: f32| if value.is_infinite() { "inf".to_owned() } else { number(value.abs().into()) };
-    let signed = |value: f32| format!("{}{}", if value < 0.0 { "-" } else { "" }, bound(value));
     let one = |k: usize| {
         let unit = if space.units[k].is_empty() { String::new() } else { format!(" [{}]", space.units[k]) };
         let bounds = match (space.low[k].is_finite(), space.high[k].is_finite()) {
             (false, false) => String::new(),
-            _ => format!(" {} to {}", signed(space.low[k]), signed(space.high[k])),
+            _ => format!(" {} to {}", number(space.low[k].into()), number(space.high[k].into())),
         };
         format!("{}{unit}{bounds}", space.names[k])
     };
