@@ -218,9 +218,10 @@ mod tests {
         Pendulum::new(VALUES, [0.2; 5], step, top_speed)
     }
 
+    /// It hangs, on the side where angles are below 0, and swings.
     fn swing(rows: usize, spacing: f64) -> Recording<Commands> {
         let time: Vec<f64> = (0..rows).map(|i| i as f64 * spacing).collect();
-        let samples = time.iter().map(|t| Some(0.4 * (3.0 * t).sin() - 0.3)).collect();
+        let samples = time.iter().map(|t| Some(0.4 * (3.0 * t).sin() - 3.1)).collect();
         let measured = vec![Measured { channel: "angle".into(), unit: "rad".into(), samples }];
         let commands = time.iter().map(|t| 2.0 * (2.0 * t).sin() + (5.0 * t).cos()).collect();
         Recording { name: "swing".into(), stimulus: Commands(commands), measured, time }
