@@ -2,8 +2,8 @@
 
     python python/examples/retrain_on_the_posterior.py
 
-The real thing is a simulator too, of which the learner is shown recordings alone: a servo with dry friction and a late drive. Learning is the
-cross-entropy method on a policy of five numbers. Takes about a minute.
+The real thing is a simulator too, of which the learner is shown recordings alone: a servo with dry friction and a late drive. Learning is
+the cross-entropy method on a policy of five numbers. Takes about a minute.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+
 import trueup
 from trueup import envs
 
