@@ -3,7 +3,7 @@
     python python/examples/retrain_on_the_posterior.py
 
 The real thing is a simulator too, of which the learner is shown recordings alone: a servo with dry friction and a late drive. Learning is
-the cross-entropy method on a policy of five numbers. Takes about a minute.
+the cross-entropy method on a policy of five numbers.
 """
 
 from __future__ import annotations
