@@ -173,7 +173,6 @@ impl Push {
         Self { about, count: 0, taken: 0, fails: None }
     }
 
-    #[expect(clippy::new_ret_no_self, reason = "lanes are what tests ask for")]
     pub fn new(lanes: usize) -> Each<Self> {
         Each::new(Self::alone(), lanes).unwrap()
     }

@@ -148,7 +148,7 @@ mod tests {
         for lane in 0..50 {
             for (step, row) in all.iter().enumerate() {
                 let age = step + 1 - row[lane] as usize;
-                assert!(age <= 4 && (age >= 1), "{age}");
+                assert!((1..=4).contains(&age), "{age}");
                 assert!(step == 0 || row[lane] >= all[step - 1][lane]);
                 if step >= 4 {
                     ages[age] += 1;
@@ -168,8 +168,9 @@ mod tests {
     fn a_latency_of_an_episode_is_the_same_throughout() {
         let all = shown(Latency::steps_between(0, 3).drawn(Redraw::Episode), 40, 5, 10);
         let mut seen = [false; 4];
+        let ages = |lane: usize| (4..10).map(move |step: usize| (lane, step));
         for lane in 0..40 {
-            let ages: Vec<usize> = (4..10).map(|step| step + 1 - all[step][lane] as usize).collect();
+            let ages: Vec<usize> = ages(lane).map(|(lane, step)| step + 1 - all[step][lane] as usize).collect();
             assert!(ages.iter().all(|age| *age == ages[0]));
             seen[ages[0]] = true;
         }
