@@ -168,13 +168,8 @@ mod tests {
     fn a_latency_of_an_episode_is_the_same_throughout() {
         let all = shown(Latency::steps_between(0, 3).drawn(Redraw::Episode), 40, 5, 10);
         let mut seen = [false; 4];
-        let ages = |lane: usize| (4..10).map(move |step: usize| (lane, step));
         for lane in 0..40 {
-<<<<<<< HEAD
             let ages: Vec<usize> = (4..).zip(&all[4..10]).map(|(step, all)| step + 1 - all[lane] as usize).collect();
-=======
-            let ages: Vec<usize> = ages(lane).map(|(lane, step)| step + 1 - all[step][lane] as usize).collect();
->>>>>>> env-rl
             assert!(ages.iter().all(|age| *age == ages[0]));
             seen[ages[0]] = true;
         }
