@@ -36,12 +36,11 @@ impl Seen {
     }
 
     /// What `order` finds where it arrives, never as late as the first print of its own: what follows that print is
-    /// its impact, and reading it would look like latency. Where it is thought to arrive later than it did, it finds what was there
-    /// as long before its print: else any delay that is too long would fit as well as the right one.
+    /// its impact, and reading it would look like latency.
     #[must_use]
     pub fn by(order: &InFlight, own_print: Option<Timestamp>) -> Self {
         let until =
-            own_print.map_or(order.arrives_at, |print| order.arrives_at.min(Timestamp(2 * print.0 - order.arrives_at.0)));
+            own_print.map_or(order.arrives_at, |print| order.arrives_at.min(print));
         Self { decided_at: order.decided_at, until }
     }
 

@@ -352,7 +352,7 @@ mod tests {
                 std::array::from_fn(|k| (block * BLOCK + k) as f64 * 5e-5 * if k % 2 == 0 { 1.0 } else { -1.0 });
             let (sin, cos) = sines(&angle);
             for k in 0..BLOCK {
-                assert!((sin[k] - angle[k].sin()).abs() < 3e-16 && (cos[k] - angle[k].cos()).abs() < 3e-16, "{}", angle[k]);
+                assert!((sin[k] - angle[k].sin()).abs() < 5e-16 && (cos[k] - angle[k].cos()).abs() < 5e-16, "{}", angle[k]);
             }
         }
         // What is beside an angle changes no bit of its sine.
