@@ -9,7 +9,7 @@ use super::{Assembly, LaneChange, LaneImage, Law, Plant, Run, Seed, Simulator, S
 /// The running part of a plant of which one lane can be changed while the others go on.
 ///
 /// # Contract
-/// After [`LaneChange::Retune`] a lane moves as one that was made with these parameters. [`check_lanes`] runs it.
+/// After [`LaneChange::Retune`] a lane moves as one that was made with these parameters. [`check_lanes`](super::check_lanes) runs it.
 pub trait LaneDynamics<P: Plant>: Dynamics<P> + Clone {
     /// Changes one lane: shows `change` all that is kept by lanes. A plant's dynamics remember nothing.
     fn change(&mut self, change: &LaneChange<'_>);
