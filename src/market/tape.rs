@@ -39,8 +39,7 @@ impl Seen {
     /// its impact, and reading it would look like latency.
     #[must_use]
     pub fn by(order: &InFlight, own_print: Option<Timestamp>) -> Self {
-        let until =
-            own_print.map_or(order.arrives_at, |print| order.arrives_at.min(print));
+        let until = own_print.map_or(order.arrives_at, |print| order.arrives_at.min(print));
         Self { decided_at: order.decided_at, until }
     }
 
