@@ -8,7 +8,7 @@ use trueup::rl::wrapper::{
 };
 use trueup::rl::{
     About, Actions, BoxSpace, Each, Env, EnvError, Episode, Episodes, InfoChannel, Made, Occasion, OptionAbout, Options,
-    Out, Rule, Space, Step, Stream, StreamName, Threads, TimeLimit, VecEnv, Which, Wrap, alike, check_env,
+    Out, Rule, Space, SplitMix64, Step, StreamName, Threads, TimeLimit, VecEnv, Which, Wrap, alike, check_env,
 };
 
 /// What is wrong with a [`Drift`].
@@ -53,7 +53,7 @@ struct Drift {
     positions: Vec<f32>,
     taken: Vec<u32>,
     over: Vec<bool>,
-    streams: Vec<Stream>,
+    streams: Vec<SplitMix64>,
     episodes: Episodes,
     shared: std::sync::Arc<std::sync::atomic::AtomicU32>,
 }
@@ -316,7 +316,7 @@ fn a_report_says_all_that_was_found() {
 struct Counter {
     about: About,
     count: i64,
-    stream: Stream,
+    stream: SplitMix64,
 }
 
 impl Counter {

@@ -5,17 +5,18 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArray1, PyReadwriteArrayDyn,
+    PyUntypedArray,
 };
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
-use trueup::io::{RunFile, hint_among};
-use trueup::market::env::{MarketSetup, make_on};
-use trueup::rl::{
-    About, Actions, AutoresetMode, BoxSpace, Checked, EnvEntry, EnvError, InfoChannel, Occasion, OptionKind, OptionValue,
-    Options, Out, Space, Threads, VecEnv, Which,
-};
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBool, PyDict, PyString, PyTuple};
+use trueup::io::hint_among;
+use trueup::market::env::make_on;
+use trueup::rl::{Actions, AutoresetMode, Checked, EnvEntry, EnvError, Out, Threads, VecEnv, Which};
 
+use crate::about::about;
 use crate::error;
+use crate::options::{market_of, options_of};
 use crate::work::words;
 
 /// Lanes from which on a step goes without Python's lock: below, to give it back costs more than the step.
@@ -45,20 +46,53 @@ pub struct Lanes {
     driver: Mutex<Driver>,
     lanes: usize,
     size: usize,
+    /// Of a single environment: what it observed last, which the array it gives out is made of.
+    row: Vec<f32>,
+    /// Names of its info.
+    names: PyOnceLock<Vec<Py<PyString>>>,
 }
 
 impl Lanes {
+    fn of(driver: Driver) -> Self {
+        let (lanes, size) = (driver.lanes(), driver.about().observation.size());
+        Self { driver: Mutex::new(driver), lanes, size, row: vec![0.0; size], names: PyOnceLock::new() }
+    }
+
+    /// A step by an array of actions, real numbers as float32, choices as int64.
+    fn stepped(&mut self, py: Python<'_>, actions: &Bound<'_, PyAny>, out: &mut Out<'_>) -> PyResult<()> {
+        if let Ok(actions) = actions.extract::<PyReadonlyArrayDyn<'_, f32>>() {
+            let actions = Actions::Continuous(actions.as_slice().map_err(|_| scattered(py, "actions"))?);
+            drive(py, self.driven(), |driver| driver.step(actions, out))
+        } else if let Ok(actions) = actions.extract::<PyReadonlyArrayDyn<'_, i64>>() {
+            let actions = Actions::Discrete(actions.as_slice().map_err(|_| scattered(py, "actions"))?);
+            drive(py, self.driven(), |driver| driver.step(actions, out))
+        } else {
+            Err(error::refused(py, "actions are no array of float32 or int64", "give one row a lane"))
+        }
+    }
+
     fn looked_at(&self) -> MutexGuard<'_, Driver> {
         self.driver.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn driven(&mut self) -> &mut Driver {
+    pub fn driven(&mut self) -> &mut Driver {
         self.driver.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
+/// The choice that an action is, if it is one whole number: of Python or of NumPy.
+fn plain(action: &Bound<'_, PyAny>) -> Option<i64> {
+    // A truth value is no choice, although it counts as a number.
+    let other = action.is_instance_of::<PyBool>() || action.is_instance_of::<PyUntypedArray>();
+    if other { None } else { action.extract().ok() }
+}
+
 /// Drives lanes, without Python's lock where there are many. A panic is a bug, and an exception.
-fn drive(py: Python<'_>, driver: &mut Driver, job: impl FnOnce(&mut Driver) -> Result<(), EnvError> + Send) -> PyResult<()> {
+pub fn drive(
+    py: Python<'_>,
+    driver: &mut Driver,
+    job: impl FnOnce(&mut Driver) -> Result<(), EnvError> + Send,
+) -> PyResult<()> {
     let caught = |driver: &mut Driver| catch_unwind(AssertUnwindSafe(|| job(driver)));
     let done = if driver.lanes() < MANY { caught(driver) } else { py.detach(|| caught(driver)) };
     match done {
@@ -108,8 +142,7 @@ impl Lanes {
             threads => Threads::new(lanes, threads, make).map(|env| Box::new(env) as Box<dyn VecEnv>),
         });
         let driver = made.and_then(|env| Checked::new(env, mode)).map_err(|error| refused(py, &error))?;
-        let size = driver.about().observation.size();
-        Ok(Self { driver: Mutex::new(driver), lanes, size })
+        Ok(Self::of(driver))
     }
 
     /// What the environment is: spaces, info channels, options.
@@ -153,15 +186,49 @@ impl Lanes {
             terminated: terminated.as_slice_mut().map_err(|_| scattered(py, "terminated"))?,
             truncated: truncated.as_slice_mut().map_err(|_| scattered(py, "truncated"))?,
         };
-        if let Ok(actions) = actions.extract::<PyReadonlyArrayDyn<'_, f32>>() {
-            let actions = Actions::Continuous(actions.as_slice().map_err(|_| scattered(py, "actions"))?);
-            drive(py, self.driven(), |driver| driver.step(actions, &mut out))
-        } else if let Ok(actions) = actions.extract::<PyReadonlyArrayDyn<'_, i64>>() {
-            let actions = Actions::Discrete(actions.as_slice().map_err(|_| scattered(py, "actions"))?);
-            drive(py, self.driven(), |driver| driver.step(actions, &mut out))
-        } else {
-            Err(error::refused(py, "actions are no array of float32 or int64", "give one row a lane"))
+        self.stepped(py, actions, &mut out)
+    }
+
+    /// A step of a single environment: what is observed, in an array of its own, the reward, terminated, truncated, and info by name.
+    /// `read` makes an array of an action that is no plain one.
+    fn step_one<'py>(
+        &mut self,
+        py: Python<'py>,
+        action: &Bound<'py, PyAny>,
+        read: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let (mut reward, mut terminated, mut truncated) = ([0.0], [false], [false]);
+        let mut row = std::mem::take(&mut self.row);
+        let mut out =
+            Out { observations: &mut row, rewards: &mut reward, terminated: &mut terminated, truncated: &mut truncated };
+        let done = match plain(action) {
+            Some(choice) => drive(py, self.driven(), |driver| driver.step(Actions::Discrete(&[choice]), &mut out)),
+            None => read.call1((action,)).and_then(|actions| self.stepped(py, &actions, &mut out)),
+        };
+        let told = done.and_then(|()| {
+            let observed = PyArray1::from_slice(py, &row);
+            let info = self.info_of_one(py)?;
+            let shape = &self.looked_at().about().observation.shape;
+            let observed = if shape.len() == 1 { observed.into_any() } else { observed.reshape(shape.clone())?.into_any() };
+            (observed, reward[0], terminated[0], truncated[0], info).into_pyobject(py)
+        });
+        self.row = row;
+        told
+    }
+
+    /// Info of a single environment, by name.
+    fn info_of_one<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let info = PyDict::new(py);
+        let driver = self.looked_at();
+        let names = self.names.get_or_init(py, || {
+            driver.about().info.iter().map(|channel| PyString::intern(py, &channel.name).unbind()).collect()
+        });
+        for (channel, name) in names.iter().enumerate() {
+            let mut value = [0.0];
+            driver.info(channel, &mut value).map_err(|error| refused(py, &error))?;
+            info.set_item(name, value[0])?;
         }
+        Ok(info)
     }
 
     /// Values of the info channels, one a lane each, by name.
@@ -211,7 +278,12 @@ impl Lanes {
 
     /// The same lanes once more, which go on with the same bits.
     fn copy(&self) -> Self {
-        Self { driver: Mutex::new(self.looked_at().clone()), lanes: self.lanes, size: self.size }
+        Self::of(self.looked_at().clone())
+    }
+
+    /// Goes on as `other`.
+    fn load(&mut self, other: &Self) {
+        *self = other.copy();
     }
 
     /// Makes lane `to` a copy of lane `from`.
@@ -234,112 +306,7 @@ impl Lanes {
     }
 }
 
-/// The market of the RUN.toml that the option `run` names, of an environment of a market.
-fn market_of(py: Python<'_>, id: &str, options: &mut Options) -> PyResult<Option<MarketSetup>> {
-    if trueup::market::ENVIRONMENTS.iter().all(|entry| entry.id != id) {
-        return Ok(None);
-    }
-    let Some(run) = options.take("run") else { return Ok(None) };
-    let OptionValue::Text(path) = run else {
-        return Err(error::refused(py, &format!("the option `run` is {run}"), "the path of a RUN.toml"));
-    };
-    let read = py.detach(|| RunFile::read(path).and_then(|file| MarketSetup::from_run(&file)));
-    read.map(Some).map_err(|error| error::input(py, &error))
-}
-
-fn scattered(py: Python<'_>, what: &str) -> PyErr {
+/// Why an array cannot be used: it is in several pieces.
+pub fn scattered(py: Python<'_>, what: &str) -> PyErr {
     error::refused(py, &format!("{what} do not lie in one piece of memory"), "give a C-contiguous array")
-}
-
-/// Options of Python's: numbers, truth values, texts.
-fn options_of(py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<Options> {
-    let mut options = Options::new();
-    for (name, value) in given {
-        let Ok(name) = name.extract::<String>() else {
-            return Err(error::refused(
-                py,
-                &format!("an option is called {}", name.repr()?),
-                "options have texts for names",
-            ));
-        };
-        let value: OptionValue = match &value {
-            value if value.is_instance_of::<PyBool>() => value.extract::<bool>()?.into(),
-            value if value.is_instance_of::<PyInt>() || value.is_instance_of::<PyFloat>() => value.extract::<f64>()?.into(),
-            value if value.is_instance_of::<PyString>() => value.extract::<String>()?.into(),
-            other => match other.call_method0("item") {
-                // A scalar of NumPy.
-                Ok(item) if item.is_instance_of::<PyBool>() => item.extract::<bool>()?.into(),
-                Ok(item) if item.is_instance_of::<PyFloat>() || item.is_instance_of::<PyInt>() => {
-                    item.extract::<f64>()?.into()
-                }
-                _ => {
-                    let message = format!("option `{name}` is {}", other.repr()?);
-                    return Err(error::refused(py, &message, "an option is a number, a truth value or a text"));
-                }
-            },
-        };
-        options.set(&name, value);
-    }
-    Ok(options)
-}
-
-fn about<'py>(py: Python<'py>, about: &About) -> PyResult<Bound<'py, PyDict>> {
-    let told = PyDict::new(py);
-    told.set_item("id", &about.id)?;
-    told.set_item("title", &about.title)?;
-    told.set_item("observation", box_space(py, &about.observation)?)?;
-    let action = match &about.action {
-        Space::Box(space) => box_space(py, space)?,
-        Space::Discrete { n, name } => {
-            let action = PyDict::new(py);
-            action.set_item("n", n)?;
-            action.set_item("names", [name])?;
-            action
-        }
-        Space::MultiDiscrete { n, names } => {
-            let action = PyDict::new(py);
-            action.set_item("n", n.clone())?;
-            action.set_item("names", names.clone())?;
-            action
-        }
-    };
-    told.set_item("action", action)?;
-    told.set_item("reward_range", about.reward_range)?;
-    told.set_item("seconds_a_step", about.seconds_a_step)?;
-    told.set_item("max_steps", about.max_steps)?;
-    let named = |channels: &[InfoChannel]| channels.iter().map(|c| (c.name.clone(), c.unit.clone())).collect::<Vec<_>>();
-    told.set_item("info", named(&about.info))?;
-    told.set_item("privileged", named(&about.privileged))?;
-    let options = PyList::empty(py);
-    for option in &about.options {
-        let row = PyDict::new(py);
-        row.set_item("name", &option.name)?;
-        row.set_item("unit", &option.unit)?;
-        row.set_item("meaning", &option.meaning)?;
-        row.set_item("at", if option.at == Occasion::Make { "make" } else { "reset" })?;
-        match option.nominal() {
-            OptionValue::Number(value) => row.set_item("nominal", value)?,
-            OptionValue::Switch(value) => row.set_item("nominal", value)?,
-            OptionValue::Text(value) => row.set_item("nominal", value)?,
-        }
-        match &option.kind {
-            OptionKind::Number { lower, upper, .. } => row.set_item("within", (lower, upper))?,
-            OptionKind::Whole { lower, upper, .. } => row.set_item("within", (lower, upper))?,
-            OptionKind::Choice { of, .. } => row.set_item("among", of.clone())?,
-            OptionKind::Switch { .. } | OptionKind::Text { .. } => {}
-        }
-        options.append(row)?;
-    }
-    told.set_item("options", options)?;
-    Ok(told)
-}
-
-fn box_space<'py>(py: Python<'py>, space: &BoxSpace) -> PyResult<Bound<'py, PyDict>> {
-    let told = PyDict::new(py);
-    told.set_item("low", PyArray1::from_slice(py, &space.low))?;
-    told.set_item("high", PyArray1::from_slice(py, &space.high))?;
-    told.set_item("shape", space.shape.clone())?;
-    told.set_item("names", space.names.clone())?;
-    told.set_item("units", space.units.clone())?;
-    Ok(told)
 }

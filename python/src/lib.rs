@@ -3,11 +3,14 @@
 //! Whatever takes long runs without Python's lock, on a thread of its own, and ends where Ctrl-C is pressed ([`work`]). Errors become
 //! exceptions ([`error`]); a panic is one too.
 
+mod about;
 mod backtest;
+mod bound;
 mod command;
 mod environment;
 mod error;
 mod initial;
+mod options;
 mod orders;
 mod simulator;
 mod strategy;
@@ -34,6 +37,7 @@ fn _trueup(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(table::write_columns, module)?)?;
     module.add_function(wrap_pyfunction!(environment::environments, module)?)?;
     module.add_class::<environment::Lanes>()?;
+    module.add_class::<bound::BoundLanes>()?;
     module.add_class::<table::Table>()?;
     module.add_class::<backtest::Outputs>()?;
     module.add_class::<view::Sight>()?;

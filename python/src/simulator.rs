@@ -6,10 +6,10 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use serde_json::json;
+use serde_json::{Value, json};
 use trueup::io::hint_among;
 use trueup::robot;
-use trueup::sim2real::diagnose::{Calibration, calibrate, diagnose};
+use trueup::sim2real::diagnose::{Calibration, Progress, calibrate, diagnose};
 use trueup::sim2real::{
     About, Candidate, Channel, Clock, Covariate, Form, Measured, Parameter, Recording, Seed, Simulated, Simulator, Thetas,
     Trajectory, Twin,
@@ -249,6 +249,24 @@ pub struct ScriptedSimulator {
 
 #[pymethods]
 impl ScriptedSimulator {
+    /// What `fit` makes of the recordings, with a callable that Ctrl-C ends.
+    fn fitted(
+        &self,
+        py: Python<'_>,
+        recordings: Vec<RecordingRow<'_>>,
+        held_out: Vec<RecordingRow<'_>>,
+        progress: Option<Py<PyAny>>,
+        fit: impl FnOnce(&Script, &[Recording<Inputs>], &[Recording<Inputs>], Progress<'_>) -> Value + Send,
+    ) -> PyResult<String> {
+        let (recordings, held_out) = (self.recordings(recordings), self.recordings(held_out));
+        let told = work::outside(py, |course| {
+            let script = Script { course: course.clone(), ..self.script.clone() };
+            let listener = course.listener(progress);
+            fit(&script, &recordings, &held_out, &|step, done, of| listener(step, done, of))
+        })?;
+        Ok(told.to_string())
+    }
+
     #[new]
     #[allow(clippy::too_many_arguments)]
     fn new(
@@ -294,8 +312,7 @@ impl ScriptedSimulator {
         Ok(Self { script })
     }
 
-    /// Follows a recording with the given values of the simulator's own parameters, then those of its mechanisms, then its initial
-    /// state: what the callable is asked for in a fit.
+    /// The diagnosis and the trued values, as JSON.
     fn diagnose(
         &self,
         py: Python<'_>,
@@ -304,21 +321,18 @@ impl ScriptedSimulator {
         seed: u64,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<String> {
-        let (recordings, held_out) = (self.recordings(recordings), self.recordings(held_out));
-        let outcome = work::outside(py, |course| {
-            let script = Script { course: course.clone(), ..self.script.clone() };
-            let listener = course.listener(progress);
-            let outcome = diagnose(&script, &recordings, &held_out, Seed(seed), &|step, done, of| listener(step, done, of));
+        self.fitted(py, recordings, held_out, progress, |script, recordings, held_out, told| {
+            let outcome = diagnose(script, recordings, held_out, Seed(seed), told);
             let trued = json!({
                 "parameters": outcome.trued.named,
                 "values": outcome.values,
                 "std": outcome.std,
             });
             json!({ "diagnosis": outcome.diagnosis, "trued": trued })
-        })?;
-        Ok(outcome.to_string())
+        })
     }
 
+    /// The values that fit, with what they leave, as JSON.
     fn calibrate(
         &self,
         py: Python<'_>,
@@ -327,17 +341,13 @@ impl ScriptedSimulator {
         seed: u64,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<String> {
-        let (recordings, held_out) = (self.recordings(recordings), self.recordings(held_out));
-        let outcome = work::outside(py, |course| {
-            let script = Script { course: course.clone(), ..self.script.clone() };
-            let listener = course.listener(progress);
+        self.fitted(py, recordings, held_out, progress, |script, recordings, held_out, told| {
             let Calibration { values, std, at_bound, fit, held_out, .. } =
-                calibrate(&script, &recordings, &held_out, Seed(seed), &|step, done, of| listener(step, done, of));
+                calibrate(script, recordings, held_out, Seed(seed), told);
             json!({
                 "parameters": script.named, "values": values, "std": std, "at_bound": at_bound, "fit": fit, "held_out": held_out,
             })
-        })?;
-        Ok(outcome.to_string())
+        })
     }
 }
 

@@ -75,6 +75,7 @@ mod vector;
 mod walk;
 pub mod wrapper;
 
+pub use crate::sim2real::SplitMix64;
 pub use about::{About, InfoChannel};
 pub use autoreset::{Autoreset, AutoresetMode, Finals};
 pub use check::{EnvReport, Finding, Rule, check_env};
@@ -85,7 +86,7 @@ pub use error::EnvError;
 pub use options::{Occasion, OptionAbout, OptionKind, OptionValue, Options};
 pub use registry::{EnvEntry, EnvRegistry, Made};
 pub use space::{Actions, BoxSpace, Space};
-pub use stream::{Episode, Stream, StreamName};
+pub use stream::{Episode, StreamName};
 pub use threads::Threads;
 pub use vector::{Buffers, Out, VecEnv, Which, alike};
 pub use wrapper::{TimeLimit, Wrap, Wrapped};

@@ -2,7 +2,7 @@
 
 use super::{
     About, Actions, BoxSpace, Each, Env, EnvError, Episode, Episodes, InfoChannel, Occasion, OptionAbout, Options, Out,
-    Space, Step, Stream, StreamName, VecEnv, Which, alike,
+    Space, SplitMix64, Step, StreamName, VecEnv, Which, alike,
 };
 
 const NOISE: StreamName = StreamName::new("noise");
@@ -15,7 +15,7 @@ pub struct Walk {
     positions: Vec<f32>,
     taken: Vec<u32>,
     acted: Vec<f32>,
-    streams: Vec<Stream>,
+    streams: Vec<SplitMix64>,
     episodes: Episodes,
 }
 
@@ -40,7 +40,7 @@ impl Walk {
             positions: vec![0.0; lanes],
             taken: vec![0; lanes],
             acted: vec![0.0; lanes],
-            streams: vec![Stream::default(); lanes],
+            streams: vec![SplitMix64::default(); lanes],
             episodes: Episodes::new(lanes),
         }
     }

@@ -3,12 +3,8 @@
 use std::any::Any;
 use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::convert::Infallible;
 
-use rand::TryRng;
-
-use super::Seed;
-use super::randomize::mixed;
+use super::{Seed, SplitMix64};
 
 /// A change of one lane. A law shows it everything it keeps by lanes, once each.
 #[derive(Debug, Clone, Copy)]
@@ -113,7 +109,7 @@ impl LaneChange<'_> {
             Self::Retune { .. } => {}
             Self::Forget { lane, seed } => {
                 if let Some(own) = draws.lanes.get_mut(lane) {
-                    *own = Counter::new(seed, draws.key);
+                    *own = SplitMix64::new(seed, draws.key);
                 }
             }
             Self::Save { lane, image } => image.save(&draws.lanes, lane),
@@ -126,7 +122,7 @@ impl LaneChange<'_> {
 #[derive(Debug, Clone)]
 pub struct LaneDraws {
     key: u64,
-    lanes: Vec<Counter>,
+    lanes: Vec<SplitMix64>,
 }
 
 impl LaneDraws {
@@ -134,75 +130,21 @@ impl LaneDraws {
     #[must_use]
     pub fn new(name: &str, lanes: usize) -> Self {
         let key = Seed(0).child(name).0;
-        Self { key, lanes: vec![Counter::new(Seed(0), key); lanes] }
+        Self { key, lanes: vec![SplitMix64::new(Seed(0), key); lanes] }
     }
 
     /// The draws of lane `lane`.
     ///
     /// # Panics
     /// If there is no such lane: an error of the calling code, not of any input.
-    pub fn lane(&mut self, lane: usize) -> &mut Counter {
+    pub fn lane(&mut self, lane: usize) -> &mut SplitMix64 {
         &mut self.lanes[lane]
-    }
-}
-
-/// A generator whose state is a number that counts up: 8 bytes a lane, and nothing to set up when an episode begins, where the
-/// streams of a [`Seed`] take more than a step of most environments.
-///
-/// Source: SplitMix64, Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014, with Stafford's
-/// mixing constants 13.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Counter(u64);
-
-/// The odd number nearest to 2^64 over the golden ratio.
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-
-impl Counter {
-    /// The draws of `seed` under the name whose key is `key`.
-    #[must_use]
-    pub const fn new(seed: Seed, key: u64) -> Self {
-        Self(mixed(mixed(seed.0.wrapping_add(GOLDEN)) ^ key))
-    }
-
-    /// The next 64 bits.
-    #[inline]
-    pub const fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(GOLDEN);
-        mixed(self.0)
-    }
-
-    /// The next number from 0 to below 1, one of 2^53 evenly apart.
-    #[inline]
-    pub const fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
-    }
-}
-
-impl TryRng for Counter {
-    type Error = Infallible;
-
-    #[inline]
-    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
-        Ok((self.bits() >> 32) as u32)
-    }
-
-    #[inline]
-    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
-        Ok(self.bits())
-    }
-
-    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
-        for chunk in bytes.chunks_mut(8) {
-            chunk.copy_from_slice(&self.bits().to_le_bytes()[..chunk.len()]);
-        }
-        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_distr::{Distribution, StandardNormal};
 
     #[test]
     fn each_change_concerns_its_lane_and_what_it_is_of() {
@@ -240,27 +182,5 @@ mod tests {
         assert_ne!(other.lane(0).bits(), first);
         LaneChange::Forget { lane: 0, seed: Seed(6) }.draws(&mut draws);
         assert_ne!(draws.lane(0).bits(), first);
-    }
-
-    /// Of seeds that follow one another, as environments have them: the first draws of each, and all of one.
-    #[test]
-    fn draws_are_even_along_a_stream_and_across_seeds() {
-        let n = 100_000;
-        let along: Vec<f64> = {
-            let mut counter = Counter::new(Seed(3), 17);
-            (0..n).map(|_| StandardNormal.sample(&mut counter)).collect()
-        };
-        let across: Vec<f64> = (0..n).map(|seed| StandardNormal.sample(&mut Counter::new(Seed(seed), 17))).collect();
-        for normal in [along, across] {
-            let moment = |k: i32| normal.iter().map(|z: &f64| z.powi(k)).sum::<f64>() / n as f64;
-            // Four standard errors each.
-            assert!(moment(1).abs() < 4.0 / (n as f64).sqrt());
-            assert!((moment(2) - 1.0).abs() < 4.0 * (2.0 / n as f64).sqrt());
-            assert!((moment(4) - 3.0).abs() < 4.0 * (96.0 / n as f64).sqrt());
-            let neighbours = normal.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n as f64;
-            assert!(neighbours.abs() < 4.0 / (n as f64).sqrt());
-        }
-        let mut counter = Counter::new(Seed(3), 17);
-        assert!((0..1_000).all(|_| (0.0..1.0).contains(&counter.unit())));
     }
 }

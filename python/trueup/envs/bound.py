@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from .. import _trueup
 from .vector import VectorEnvironment, _wrong
 
 
@@ -56,29 +57,33 @@ class BoundEnvironment:
         self.rewards = _buffer("rewards", rewards, (lanes,), ("float32", "float64"))
         self.terminals = _buffer("terminals", terminals, (lanes,), ("bool", "uint8"))
         self.truncations = _buffer("truncations", truncations, (lanes,), ("bool", "uint8"))
-        # The library writes numbers of its own types; where a buffer is of another, what was written is copied once.
-        self._actions = self.actions if self.actions.dtype == env._read.dtype else np.zeros(acted, env._read.dtype)
-        self._rewards = self.rewards if self.rewards.dtype == np.float64 else np.zeros(lanes, np.float64)
-        self._terminals, self._truncations = (b.view(np.bool_) for b in (self.terminals, self.truncations))
+        # What is no truth value is none to the library either.
+        self.terminals[...] = 0
+        self.truncations[...] = 0
+        self._bound = _trueup.BoundLanes(
+            env._lanes,
+            self.actions,
+            self.observations,
+            self.rewards,
+            self.terminals.view(np.bool_),
+            self.truncations.view(np.bool_),
+        )
+        self._step = self._bound.step
 
     def reset(self, seed: int | None = None) -> tuple[np.ndarray, list]:
         """Begin an episode in every lane: the buffer of observations, and no info."""
         observations, _ = self.env.reset(seed=seed)
         self.observations[...] = observations
         self.rewards[...] = 0
-        self._terminals[...] = False
-        self._truncations[...] = False
+        self.terminals[...] = False
+        self.truncations[...] = False
         return self.observations, []
 
     def step(self, actions: np.ndarray | None = None):
         """Take a step by the buffer of actions, into which `actions` are written before where they are given: all buffers, and info."""
         if actions is not None:
             self.actions[...] = actions
-        if self._actions is not self.actions:
-            self._actions[...] = self.actions
-        self.env._lanes.step(self._actions, self.observations, self._rewards, self._terminals, self._truncations)
-        if self._rewards is not self.rewards:
-            self.rewards[...] = self._rewards
+        self._step()
         return self.observations, self.rewards, self.terminals, self.truncations, []
 
     def close(self) -> None:

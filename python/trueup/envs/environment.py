@@ -61,7 +61,6 @@ class Environment(gymnasium.Env):
         self.observation_space = spaces.box(self.about["observation"])
         self.action_space = spaces.action(self.about["action"])
         self._read = spaces.ActionReader(self.action_space, None)
-        self._informs = bool(self.about["info"])
         self._seeded = False
         self._flags = (np.empty(1, np.float64), np.empty(1, np.bool_), np.empty(1, np.bool_))
 
@@ -77,22 +76,17 @@ class Environment(gymnasium.Env):
         observation = np.empty(self.observation_space.shape, np.float32)
         self._lanes.reset(None if lane_seed is None else [lane_seed], None, dict(options or {}), observation)
         self._seeded = True
-        return observation, self._info()
+        return observation, self._lanes.info_of_one()
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Take a step: observation, reward, terminated, truncated, info."""
-        observation = np.empty(self.observation_space.shape, np.float32)
-        reward, terminated, truncated = self.step_into(action, observation)
-        return observation, reward, terminated, truncated, self._info()
+        return self._lanes.step_one(action, self._read)
 
     def step_into(self, action: Any, observation: np.ndarray) -> tuple[float, bool, bool]:
         """Take a step, and write what is observed into `observation`: reward, terminated, truncated."""
         rewards, terminated, truncated = self._flags
         self._lanes.step(self._read(action), observation, rewards, terminated, truncated)
         return float(rewards[0]), bool(terminated[0]), bool(truncated[0])
-
-    def _info(self) -> dict[str, Any]:
-        return {name: float(values[0]) for name, values in self._lanes.info().items()} if self._informs else {}
 
     def privileged(self) -> dict[str, float]:
         """What was drawn for this episode and is not observed, by name: for critics, never for policies."""
@@ -110,7 +104,7 @@ class Environment(gymnasium.Env):
         if not fits or snapshot._kept["options"] != self._options:
             hint = "restore snapshots of environments made alike"
             raise seeds.InputError(f"{snapshot!r} is no snapshot of {self}\n  hint: {hint}", hint=hint)
-        self._lanes = snapshot._lanes.copy()
+        self._lanes.load(snapshot._lanes)
         self._np_random, self._np_random_seed = copy.deepcopy(snapshot._kept["np_random"]), snapshot._kept["np_random_seed"]
         self._seeded = snapshot._kept["seeded"]
 

@@ -196,7 +196,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv):
         fits = isinstance(snapshot, Snapshot) and snapshot.identity == self._identity
         if not fits or snapshot._kept["options"] != self._options or snapshot._kept.get("settings") != own:
             raise _wrong(f"{snapshot!r} is no snapshot of these lanes", "restore snapshots of environments made alike")
-        self._lanes = snapshot._lanes.copy()
+        self._lanes.load(snapshot._lanes)
         kept = snapshot._kept
         self._seeded = kept["seeded"].copy()
         self._observed = None if kept["observed"] is None else kept["observed"].copy()

@@ -1,6 +1,8 @@
 //! An environment played with random actions, each lane by itself, and all that came of it.
 
-use crate::rl::{About, Actions, BoxSpace, Buffers, EnvError, Episode, Options, Space, Stream, StreamName, VecEnv, Which};
+use crate::rl::{
+    About, Actions, BoxSpace, Buffers, EnvError, Episode, Options, Space, SplitMix64, StreamName, VecEnv, Which,
+};
 
 /// What came of one step, or of a reset, in a lane: numbers by their bits.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,7 +20,7 @@ pub struct Play {
     pub env: Box<dyn VecEnv>,
     pub buffers: Buffers,
     /// Where each lane's actions come from.
-    actors: Vec<Stream>,
+    actors: Vec<SplitMix64>,
     over: Vec<bool>,
     /// All that came of each lane.
     pub rows: Vec<Vec<Row>>,
@@ -151,7 +153,7 @@ impl Play {
 }
 
 /// An action of component `k`, evenly drawn from the space, or from -10 to 10 where it has no bounds.
-fn drawn(space: &BoxSpace, k: usize, actor: &mut Stream) -> f32 {
+fn drawn(space: &BoxSpace, k: usize, actor: &mut SplitMix64) -> f32 {
     let (low, high) = (space.low[k].max(-10.0), space.high[k].min(10.0));
     let (low, high) = if low <= high { (low, high) } else { (space.low[k], space.high[k]) };
     let value = actor.between(low.into(), high.into()) as f32;
@@ -161,7 +163,7 @@ fn drawn(space: &BoxSpace, k: usize, actor: &mut Stream) -> f32 {
     ends.get(choice as usize).copied().unwrap_or(value).clamp(low, high)
 }
 
-fn chosen(n: usize, actor: &mut Stream) -> i64 {
+fn chosen(n: usize, actor: &mut SplitMix64) -> i64 {
     (actor.uniform() * n as f64) as i64
 }
 

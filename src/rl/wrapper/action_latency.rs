@@ -3,7 +3,7 @@
 use super::delay_line::{DelayLine, FixedLine};
 use super::latency::{Latency, Redraw, Steps};
 use super::layer::{copy_row, neutral};
-use crate::rl::{About, Actions, EnvError, Episodes, Options, Out, Space, Stream, StreamName, VecEnv, Which, alike};
+use crate::rl::{About, Actions, EnvError, Episodes, Options, Out, Space, SplitMix64, StreamName, VecEnv, Which, alike};
 
 /// The environment acts by the last action sent of those that have arrived.
 ///
@@ -18,7 +18,7 @@ pub struct ActionLatency<E> {
     episodes: Episodes,
     parts: usize,
     steps: Steps,
-    streams: Vec<Stream>,
+    streams: Vec<SplitMix64>,
     /// The latency [parts] of the episode each lane is in.
     episode: Vec<u64>,
     line: Line,
@@ -126,7 +126,7 @@ impl<E: VecEnv> ActionLatency<E> {
         Ok(Self {
             name: StreamName::new("action_latency"),
             episodes: Episodes::new(lanes),
-            streams: vec![Stream::default(); lanes],
+            streams: vec![SplitMix64::default(); lanes],
             episode: vec![0; lanes],
             env,
             about,

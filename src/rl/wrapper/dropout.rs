@@ -1,7 +1,7 @@
 //! Observations that are lost.
 
 use super::layer::{Layer, copy_row, refused};
-use crate::rl::{About, Actions, EnvError, Episodes, Out, Stream, StreamName, Which};
+use crate::rl::{About, Actions, EnvError, Episodes, Out, SplitMix64, StreamName, Which};
 
 /// What is shown in the place of what was lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -21,7 +21,7 @@ pub struct Dropout {
     lost: Lost,
     name: StreamName,
     size: usize,
-    streams: Vec<Stream>,
+    streams: Vec<SplitMix64>,
     shown: Vec<f32>,
 }
 
@@ -74,7 +74,7 @@ impl Layer for Dropout {
             about.observation.low.iter_mut().for_each(|low| *low = low.min(0.0));
             about.observation.high.iter_mut().for_each(|high| *high = high.max(0.0));
         }
-        self.streams = vec![Stream::default(); lanes];
+        self.streams = vec![SplitMix64::default(); lanes];
         // Where nothing is held, this stays 0 and is what is shown.
         self.shown = vec![0.0; lanes * self.size];
         Ok(())

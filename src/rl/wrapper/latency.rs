@@ -1,6 +1,6 @@
 //! How long a message takes.
 
-use crate::rl::{About, Stream};
+use crate::rl::{About, SplitMix64};
 
 /// How long messages are under way: a whole number of steps, or any time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,7 +101,7 @@ impl Steps {
 
     /// One that is drawn.
     #[inline]
-    pub fn draw(&self, stream: &mut Stream) -> f64 {
+    pub fn draw(&self, stream: &mut SplitMix64) -> f64 {
         if self.low == self.high {
             self.low
         } else if self.whole {

@@ -3,14 +3,14 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::layer::{Layer, copy_row, refused};
-use crate::rl::{About, Actions, EnvError, Episodes, Out, Stream, StreamName, Which};
+use crate::rl::{About, Actions, EnvError, Episodes, Out, SplitMix64, StreamName, Which};
 
 /// Adds Gaussian noise, drawn anew for each component and each step, to what is observed. A component that is noisy has no bounds.
 #[derive(Debug, Clone)]
 pub struct ObservationNoise {
     name: StreamName,
     std: Vec<f32>,
-    streams: Vec<Stream>,
+    streams: Vec<SplitMix64>,
 }
 
 impl ObservationNoise {
@@ -27,7 +27,7 @@ impl ObservationNoise {
     }
 
     #[inline]
-    fn add(std: &[f32], stream: &mut Stream, row: &mut [f32]) {
+    fn add(std: &[f32], stream: &mut SplitMix64, row: &mut [f32]) {
         let mut own = *stream;
         for (value, std) in row.iter_mut().zip(std) {
             if *std > 0.0 {
@@ -59,7 +59,7 @@ impl Layer for ObservationNoise {
                 (about.observation.low[k], about.observation.high[k]) = (f32::NEG_INFINITY, f32::INFINITY);
             }
         }
-        self.streams = vec![Stream::default(); lanes];
+        self.streams = vec![SplitMix64::default(); lanes];
         Ok(())
     }
 

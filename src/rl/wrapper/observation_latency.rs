@@ -3,7 +3,7 @@
 use super::delay_line::{DelayLine, FixedLine};
 use super::latency::{Latency, Redraw, Steps, rounded_up};
 use super::layer::{Layer, copy_row, refused};
-use crate::rl::{About, Actions, EnvError, Episodes, Out, Stream, StreamName, Which};
+use crate::rl::{About, Actions, EnvError, Episodes, Out, SplitMix64, StreamName, Which};
 
 /// The learner is shown the newest observation that has arrived. It looks at the times of steps: an observation under way for a
 /// fraction of a step is seen from the next step on. That of the reset arrives at once. Rewards and ends are not late.
@@ -18,7 +18,7 @@ pub struct ObservationLatency {
 #[derive(Debug, Clone)]
 enum Line {
     Fixed(FixedLine<f32>),
-    Drawn { line: DelayLine<f32>, steps: Steps, streams: Vec<Stream>, episode: Vec<u64> },
+    Drawn { line: DelayLine<f32>, steps: Steps, streams: Vec<SplitMix64>, episode: Vec<u64> },
 }
 
 impl ObservationLatency {
@@ -47,7 +47,7 @@ impl Layer for ObservationLatency {
             None => Line::Drawn {
                 line: DelayLine::new(lanes, self.size, steps.longest()),
                 steps,
-                streams: vec![Stream::default(); lanes],
+                streams: vec![SplitMix64::default(); lanes],
                 episode: vec![0; lanes],
             },
         };

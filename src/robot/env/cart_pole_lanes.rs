@@ -5,13 +5,14 @@
 
 #![allow(clippy::needless_range_loop, reason = "one index for many rows is what becomes vector instructions")]
 
+use pulp::{Arch, NullaryFnOnce};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::cart_pole::{START, Thresholds};
 use super::cart_pole_wires::{Delay, LONGEST_DELAY, Noise, Wires, plain};
 use crate::rl::Episode;
 use crate::robot::sine::sine;
-use crate::sim2real::{Counter, Seed};
+use crate::sim2real::{Seed, SplitMix64};
 
 /// Lanes that are stepped at once.
 pub(super) const BLOCK: usize = 8;
@@ -122,7 +123,7 @@ impl CartPoleLanes {
         let padded = blocks * BLOCK;
         let key = Seed(0).child("noise").0;
         let delay = wires.delay.map(|_| Delay { past: vec![0; padded], steps: vec![0; padded], rest: vec![0.0; padded] });
-        let draws = || vec![Counter::new(Seed(0), key); padded];
+        let draws = || vec![SplitMix64::new(Seed(0), key); padded];
         let noise = wires.noise.map(|_| Noise { std: vec![0.0; padded], draws: draws(), key });
         let states = vec![State::default(); blocks];
         let constants = vec![Constants::of(values); if own { blocks } else { 1 }];
@@ -156,7 +157,7 @@ impl CartPoleLanes {
         self.steps[lane] = 0;
         let mut seen = state;
         if let Some(noise) = &mut self.noise {
-            noise.draws[lane] = Counter::new(episode.seed(), noise.key);
+            noise.draws[lane] = SplitMix64::new(episode.seed(), noise.key);
             let draw: f64 = StandardNormal.sample(&mut noise.draws[lane]);
             seen[0] += noise.std[lane] * draw;
         }
@@ -169,31 +170,10 @@ impl CartPoleLanes {
         [own.position[k], own.velocity[k], own.angle[k], own.spin[k]]
     }
 
-    /// Takes a step in all lanes by `actions`, 0 or 1 each, and writes what is observed and whether the episode is over.
+    /// Takes a step in all lanes by `actions`, 0 or 1 each, and writes what is observed and whether the episode is over. With the widest
+    /// vectors the processor has: the bits are the same with any.
     pub fn step(&mut self, actions: &[i64], observations: &mut [f32], terminated: &mut [bool]) {
-        let Self { states, constants, delay, noise, steps, step, thresholds, .. } = self;
-        let one = constants.len() == 1;
-        let rows = observations.chunks_mut(4 * BLOCK).zip(terminated.chunks_mut(BLOCK));
-        let lanes = states.iter_mut().zip(steps.chunks_exact_mut(BLOCK)).zip(actions.chunks(BLOCK)).zip(rows);
-        for (block, (((state, steps), given), (observations, terminated))) in lanes.enumerate() {
-            let own = if one { &constants[0] } else { &constants[block] };
-            let mut actions = [0; BLOCK];
-            actions[..given.len()].copy_from_slice(given);
-            let mut command = match delay {
-                None => plain(&actions),
-                Some(delay) => delay.pass(block, &actions, steps),
-            };
-            for k in 0..BLOCK {
-                command[k] *= own.gain[k];
-                steps[k] = steps[k].saturating_add(1);
-            }
-            advance(state, own, &command, *step);
-            let mut seen = state.position;
-            if let Some(noise) = noise {
-                noise.add(block, &mut seen[..given.len()]);
-            }
-            write(state, &seen, thresholds, observations, terminated);
-        }
+        Arch::new().dispatch(Stepped { lanes: self, actions, observations, terminated });
     }
 
     /// Number of lanes.
@@ -215,7 +195,7 @@ impl CartPoleLanes {
             self.delay.as_ref().map(|_| Delay { past: vec![0; BLOCK], steps: vec![0; BLOCK], rest: vec![0.0; BLOCK] });
         let noise = self.noise.as_ref().map(|noise| Noise {
             std: vec![0.0; BLOCK],
-            draws: vec![Counter::new(Seed(0), noise.key); BLOCK],
+            draws: vec![SplitMix64::new(Seed(0), noise.key); BLOCK],
             key: noise.key,
         });
         let (states, steps) = (vec![State::default(); 1], vec![0; BLOCK]);
@@ -237,6 +217,46 @@ impl CartPoleLanes {
         if self.constants.len() > 1 || self.states.len() == 1 {
             let from_block = if other.constants.len() == 1 { 0 } else { from / BLOCK };
             self.constants[block].copy_lane(&other.constants[from_block], from % BLOCK, k);
+        }
+    }
+}
+
+/// A step of all lanes, with what it reads and writes.
+struct Stepped<'a> {
+    lanes: &'a mut CartPoleLanes,
+    actions: &'a [i64],
+    observations: &'a mut [f32],
+    terminated: &'a mut [bool],
+}
+
+impl NullaryFnOnce for Stepped<'_> {
+    type Output = ();
+
+    // What is not inlined here is compiled without the processor's vectors.
+    #[inline(always)]
+    fn call(self) {
+        let CartPoleLanes { states, constants, delay, noise, steps, step, thresholds, .. } = self.lanes;
+        let one = constants.len() == 1;
+        let rows = self.observations.chunks_mut(4 * BLOCK).zip(self.terminated.chunks_mut(BLOCK));
+        let lanes = states.iter_mut().zip(steps.chunks_exact_mut(BLOCK)).zip(self.actions.chunks(BLOCK)).zip(rows);
+        for (block, (((state, steps), given), (observations, terminated))) in lanes.enumerate() {
+            let own = if one { &constants[0] } else { &constants[block] };
+            let mut actions = [0; BLOCK];
+            actions[..given.len()].copy_from_slice(given);
+            let mut command = match delay {
+                None => plain(&actions),
+                Some(delay) => delay.pass(block, &actions, steps),
+            };
+            for k in 0..BLOCK {
+                command[k] *= own.gain[k];
+                steps[k] = steps[k].saturating_add(1);
+            }
+            advance(state, own, &command, *step);
+            let mut seen = state.position;
+            if let Some(noise) = noise {
+                noise.add(block, &mut seen[..given.len()]);
+            }
+            write(state, &seen, thresholds, observations, terminated);
         }
     }
 }

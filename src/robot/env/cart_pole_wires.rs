@@ -3,7 +3,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::cart_pole_lanes::{BLOCK, Row};
-use crate::sim2real::Counter;
+use crate::sim2real::SplitMix64;
 
 /// A delay of each lane's command. A push has one of two directions, so that a bit a step tells all there was.
 #[derive(Debug, Clone)]
@@ -25,7 +25,7 @@ pub(super) struct Noise {
     /// Standard deviation of each lane [m].
     pub std: Vec<f64>,
     /// What each lane draws from.
-    pub draws: Vec<Counter>,
+    pub draws: Vec<SplitMix64>,
     /// The key of the stream.
     pub key: u64,
 }

@@ -2,7 +2,7 @@
 
 use crate::rl::{Episode, Episodes, InfoChannel};
 use crate::sim2real::randomize::{DrawKey, DrawTable, Level, Occasion, Randomizer, Redraw, Target, Turn};
-use crate::sim2real::{Counter, Parameter, Seed};
+use crate::sim2real::{Parameter, Seed, SplitMix64};
 
 /// What is randomized of an assembly.
 #[derive(Debug, Clone)]
@@ -57,7 +57,7 @@ struct Regimes {
     seconds: f64,
     now: Vec<Option<usize>>,
     entered: Vec<u64>,
-    draws: Vec<Counter>,
+    draws: Vec<SplitMix64>,
 }
 
 /// The key of the draws of regimes: the name's hash.
@@ -79,7 +79,7 @@ impl LaneParameters {
             seconds: randomization.as_ref().map_or(1.0, |r| r.regime_seconds),
             now: vec![None; kept],
             entered: vec![0; kept],
-            draws: vec![Counter::new(Seed(0), REGIME); kept],
+            draws: vec![SplitMix64::new(Seed(0), REGIME); kept],
         };
         Self {
             whole: nominal.clone(),
@@ -150,7 +150,7 @@ impl LaneParameters {
         if self.regimes.count > 0 {
             self.regimes.now[lane] = None;
             self.regimes.entered[lane] = 0;
-            self.regimes.draws[lane] = Counter::new(episode.seed(), REGIME);
+            self.regimes.draws[lane] = SplitMix64::new(episode.seed(), REGIME);
         }
         self.whole(lane)
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::rl::{Episode, Stream, StreamName};
+use crate::rl::{Episode, SplitMix64, StreamName};
 
 /// Names the stream of set points.
 const SET_POINT: StreamName = StreamName::new("set point");
@@ -38,7 +38,7 @@ pub(super) enum SetPoint {
         /// Farthest from 0.
         reach: f64,
         /// What the next are drawn from.
-        draws: Stream,
+        draws: SplitMix64,
     },
     /// It moves.
     Sines {

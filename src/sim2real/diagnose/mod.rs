@@ -16,7 +16,9 @@ mod by_recording;
 mod changes;
 mod confidence;
 mod diagnosis;
+mod effects;
 mod evidence;
+mod exact;
 mod excitation;
 mod experiment;
 mod forms;
@@ -232,7 +234,7 @@ fn followed<T: Twin>(
         std: uncertainty::inflated(&inquiry, &selection.selected, &trued),
         trued: trued.clone(),
         sampled: twin.clock() != Clock::Event,
-        inexact: verdict::inexact(&inquiry, &selection),
+        inexact: exact::inexact(&inquiry, &selection),
     };
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
     // What the fit has named already need not be recognized besides.

@@ -1,9 +1,8 @@
 //! How well what was fitted is known: as the residuals make it, and as laws of another form would.
 
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::verdict::ABOVE_THE_NOISE;
-use super::whiteness;
-use crate::sim2real::identify::{Block, Fit};
+use super::{exact, whiteness};
+use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Parameter, Twin};
 
 /// What the constants of laws are off by because the real thing has another form, as a part of them, but for times: ...
@@ -24,7 +23,7 @@ pub(super) fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesi
         .sqrt();
     let own = inquiry.twin.parameters().len();
     let parameters = hypothesis.twin.parameters().iter().enumerate();
-    let by_a_rule = exact(inquiry, hypothesis, fit);
+    let by_a_rule = exact::by_a_rule(inquiry, hypothesis, fit);
     let widened = |(k, p): (usize, &Parameter)| {
         let std = fit.std[k] * factor;
         let of_another_form = k >= own && std > 0.0 && !by_a_rule.contains(&k);
@@ -34,26 +33,4 @@ pub(super) fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesi
         if of_another_form { (BEYOND_NOISE * std).hypot(relative) } else { std }
     };
     parameters.map(widened).collect()
-}
-
-/// The parameters that nothing depends on but channels without noise, where these are explained to within their rounding: what is
-/// charged is charged by a rule.
-fn exact<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, fit: &Fit) -> Vec<usize> {
-    let channels = inquiry.twin.channels();
-    let exact = |name: &str| channels.iter().any(|channel| channel.exact && channel.name == name);
-    let loose = hypothesis.misfits.iter().any(|misfit| exact(&misfit.channel) && !misfit.within(ABOVE_THE_NOISE, 1.0));
-    if loose || !channels.iter().any(|channel| channel.exact) {
-        return Vec::new();
-    }
-    let problem = inquiry.problem(&hypothesis.twin, &inquiry.evidence.compared);
-    let blocks: Vec<Block> = problem.blocks().into_iter().filter(|block| !exact(&block.channel)).collect();
-    let residual = |values: &[f64]| problem.evaluate(values, &hypothesis.fit.state, &[]).residual;
-    let at = residual(&fit.values);
-    let moves = |k: &usize| {
-        let mut values = fit.values.clone();
-        values[*k] = if values[*k] == 0.0 { hypothesis.twin.parameters()[*k].scale() } else { 1.2 * values[*k] };
-        let moved = residual(&values);
-        blocks.iter().any(|block| block.range.clone().any(|row| (moved[row] - at[row]).abs() > 1e-9))
-    };
-    (inquiry.twin.parameters().len()..fit.values.len()).filter(|k| !moves(k)).collect()
 }

@@ -3,16 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Found;
-use super::confidence::{by_evidence, calibrated};
-use super::diagnosis::{
-    ChannelFit, Checks, Diagnosis, Effect, Estimate, ParameterChange, Rival, SCHEMA, Score, Verdict, Where,
-};
+use super::diagnosis::{ChannelFit, Checks, Diagnosis, Effect, ParameterChange, SCHEMA, Score, Verdict, Where};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::remainder::NEAR_THE_NOISE;
 use super::rivals::Place;
 use super::select::Selection;
 use super::structure::Dependence;
-use super::{whiteness, words};
+use super::{effects, whiteness, words};
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Candidate, Clock, Part, Twin};
 
@@ -35,24 +32,14 @@ const FAR_ABOVE_THE_NOISE: f64 = 9.0;
 pub(super) const ABOVE_THE_NOISE: f64 = 2.0;
 /// What a regression foretells counts where the mean squared residual is more than this many times the noise.
 const HARDLY_ABOVE: f64 = 1.2;
-/// A row of a channel without noise is off by more than this, in roundings, and more rows than one are, where something is missing.
-const FAR_OFF: f64 = 5.0;
-const FEW: usize = 4;
 /// With fewer rows than this, what is not explained is not called explained either.
 const FEWEST_ROWS: usize = 50;
-/// Confidence in what needs no fit to be seen.
-const CERTAIN_BY_SIGHT: f64 = 0.99;
-/// A mechanism that changes the residuals by less than this, in noise and over all rows, does nothing. Where they are smaller than the
-/// noise, as those of prices that are rounded to ticks may be, it is in their own size.
-const DISTINCT: f64 = 5.0;
 /// Larger by less than this, an error is as large.
 const WORSE: f64 = 1.02;
 /// What is less likely than this to be the library's is not said to be.
 const HARDLY_THE_LIBRARY: f64 = 0.1;
 /// The same of what does not carry over to held-out data either.
 const LIKELIER_THAN_NOT: f64 = 0.5;
-/// A limit that varies from order to order leaves this part of the squares at most, where it varies by a third of what it takes away.
-const VARIES: f64 = 0.1;
 /// A name less certain than this is ambiguous.
 const CERTAIN: f64 = 0.7;
 
@@ -79,9 +66,9 @@ pub(super) fn diagnosis<T: Twin>(
     findings: &Findings,
 ) -> Diagnosis {
     let selected = &selection.selected;
-    let mut effects = effects(inquiry, selected, places, findings);
+    let mut effects = effects::fitted(inquiry, selected, places, findings);
     let verdict = match decide(selection, &effects, findings) {
-        Verdict::Named | Verdict::Ambiguous if !distinct(inquiry, selected) => Verdict::Unexplained,
+        Verdict::Named | Verdict::Ambiguous if !effects::distinct(inquiry, selected) => Verdict::Unexplained,
         verdict => verdict,
     };
     if verdict == Verdict::Unexplained {
@@ -129,13 +116,13 @@ pub(super) fn facts<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> w
 pub(super) fn recognized<T: Twin>(
     diagnosis: &mut Diagnosis,
     inquiry: &Inquiry<'_, T>,
-    Found { signs, of_steps, lost, .. }: &Found,
+    of_what: &Found,
     found: &[&Candidate],
 ) {
     if found.is_empty() {
         return;
     }
-    let unit = inquiry.twin.unit("output");
+    let (unit, signs) = (inquiry.twin.unit("output"), &of_what.signs);
     let of_signs = [
         (signs.repeated > 0.0).then(|| {
             let share = 100.0 * signs.repeated;
@@ -150,50 +137,7 @@ pub(super) fn recognized<T: Twin>(
             format!("The recordings show that {told}; for the rest the {} explains them.", inquiry.twin.name());
     }
     diagnosis.checks.notes.push(told);
-    diagnosis.effects.extend(found.iter().map(|candidate| {
-        let losses = !of_steps.iter().any(|other| other.about.name == candidate.about.name);
-        Effect {
-            mechanism: candidate.about.name.to_owned(),
-            site: candidate.about.site,
-            confidence: CERTAIN_BY_SIGHT,
-            gain: None,
-            margin: None,
-            parameters: candidate
-                .form
-                .parameters
-                .iter()
-                .map(|p| {
-                    let estimate = Estimate { value: p.nominal, std: 0.0, unit: inquiry.twin.unit(&p.unit) };
-                    (p.name.clone().into_owned(), estimate)
-                })
-                .collect(),
-            rivals: Vec::new(),
-            location: losses.then(|| format!("at times: {:.1} % of the rows", 100.0 * signs.repeated)),
-            active: if losses { lost.clone() } else { Vec::new() },
-            moved: Vec::new(),
-        }
-    }));
-}
-
-/// Whether every mechanism found does something: with its parameters put back to where they do nothing, and all others left
-/// as they are, residuals must change. A fit may be helped out of a wrong place by a mechanism that then does nothing.
-fn distinct<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> bool {
-    let problem = inquiry.problem(&selected.twin, &inquiry.evidence.compared);
-    let fit = &selected.fit;
-    let residual = |values: &[f64]| problem.evaluate(values, &fit.state, &[]).residual;
-    let with = residual(&fit.values);
-    let size = (with.norm_squared() / with.len().max(1) as f64).sqrt().min(1.0);
-    let mut at = inquiry.twin.parameters().len();
-    selected.added.iter().all(|number| {
-        let candidate = &inquiry.candidates[*number];
-        let (from, count) = (at, candidate.form.parameters.len());
-        at += count;
-        let mut values = fit.values.clone();
-        for (value, p) in values[from..from + count].iter_mut().zip(&candidate.form.parameters) {
-            *value = p.nominal;
-        }
-        candidate.finishing || (&with - residual(&values)).norm() >= DISTINCT * size
-    })
+    diagnosis.effects.extend(found.iter().map(|candidate| effects::seen(inquiry, of_what, candidate)));
 }
 
 /// The parameters that ended at a bound, those of mechanisms behind their mechanism's id.
@@ -217,29 +161,13 @@ fn not_excited(scores: &[Score]) -> Vec<String> {
     ids
 }
 
-/// Whether channels without noise are further off than their rounding, in more than a row or two, and by more than what is named
-/// leaves where it varies from row to row: of the squares the recalibrated twin leaves there, no more than [`VARIES`].
-pub(super) fn inexact<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> bool {
-    let exact = |name: &str| inquiry.twin.channels().iter().any(|channel| channel.exact && channel.name == name);
-    let Selection { recalibrated, selected, .. } = selection;
-    let squares =
-        |channel: &str| recalibrated.misfits.iter().find(|m| m.channel == channel).map_or(0.0, |m| m.sum_of_squares);
-    let off = selected.misfits.iter().any(|m| {
-        let left = m.sum_of_squares > VARIES * squares(&m.channel);
-        exact(&m.channel) && left && !m.within(ABOVE_THE_NOISE, 1.0)
-    });
-    let blocks = inquiry.problem(&selected.twin, &inquiry.evidence.compared).blocks();
-    let rows = blocks.into_iter().filter(|block| exact(&block.channel)).flat_map(|block| block.range);
-    off && rows.filter(|row| selected.fit.residual[*row].abs() > FAR_OFF).count() >= FEW
-}
-
 fn structured(findings: &Findings) -> bool {
     findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
 }
 
 /// The part of the recalibrated misfit above the noise that is left on held-out data; the noise is known to
 /// [`NOISE_KNOWN`].
-fn held_out_remainder(fit: &ChannelFit) -> f64 {
+pub(super) fn held_out_remainder(fit: &ChannelFit) -> f64 {
     let above = |rmse: f64, known: f64| (rmse * rmse - known * fit.noise_floor * fit.noise_floor).max(0.0);
     let misfit = above(fit.recalibrated_rmse, 1.0);
     if misfit > 0.0 { above(fit.trued_rmse, NOISE_KNOWN) / misfit } else { 0.0 }
@@ -311,61 +239,6 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
     if unseen || effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
 }
 
-fn effects<T: Twin>(
-    inquiry: &Inquiry<'_, T>,
-    selected: &Hypothesis<T>,
-    places: &[Place],
-    findings: &Findings,
-) -> Vec<Effect> {
-    let mut at = inquiry.twin.parameters().len();
-    let unseen = findings.fits.iter().map(held_out_remainder).fold(0.0, f64::max);
-    let fitted = selected.added.iter().filter(|number| !inquiry.candidates[**number].finishing).count();
-    let mut effects: Vec<Effect> = Vec::new();
-    for (number, place) in selected.added.iter().zip(places) {
-        let candidate = &inquiry.candidates[*number];
-        let (confidence, others) = match candidate.finishing {
-            // Steps are seen; that they fit is no more than a check.
-            true => (CERTAIN_BY_SIGHT, Vec::new()),
-            false if findings.sampled => calibrated(place, unseen, fitted.saturating_sub(1)),
-            false => by_evidence(place),
-        };
-        let parameters = candidate
-            .form
-            .parameters
-            .iter()
-            .enumerate()
-            .map(|(k, p)| {
-                let (value, std) = (findings.trued.values[at + k], findings.std[at + k]);
-                (p.name.clone().into_owned(), Estimate { value, std, unit: inquiry.twin.unit(&p.unit) })
-            })
-            .collect();
-        at += candidate.form.parameters.len();
-        let mut rivals: Vec<Rival> = Vec::new();
-        for ((other, _), confidence) in place.others.iter().zip(others) {
-            let mechanism = inquiry.candidates[*other].about.name.to_owned();
-            match rivals.iter_mut().find(|r| r.mechanism == mechanism) {
-                Some(rival) => rival.confidence += confidence,
-                None => rivals.push(Rival { mechanism, confidence }),
-            }
-        }
-        rivals.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-        effects.push(Effect {
-            mechanism: candidate.about.name.to_owned(),
-            site: candidate.about.site,
-            confidence,
-            gain: Some(place.gain),
-            margin: place.nearest,
-            parameters,
-            rivals,
-            location: None,
-            active: Vec::new(),
-            moved: Vec::new(),
-        });
-    }
-    effects.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-    effects
-}
-
 fn parameters<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     selected: &Hypothesis<T>,
@@ -431,6 +304,7 @@ fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: 
 mod tests {
     use super::*;
     use crate::sim2real::Site;
+    use crate::sim2real::diagnose::diagnosis::Rival;
 
     fn effect(confidence: f64, rivals: &[f64]) -> Effect {
         let rival = |c: &f64| Rival { mechanism: "rival".into(), confidence: *c };

@@ -34,7 +34,6 @@ pub use posterior::{Posterior, PosteriorError};
 pub use predictive::{BANDS, BandShare, Bands, Coverage, OUTSIDE, WIDEST, quantiles};
 pub use preset::{Preset, PresetRow, Presets};
 pub use randomizer::{RandomizeError, Randomizer, Turn};
-pub(super) use stream::mixed;
 pub use stream::{DrawKey, Occasion};
 pub use table::DrawTable;
 pub use target::{Implausible, Randomized, Redraw, Target};

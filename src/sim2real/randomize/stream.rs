@@ -1,6 +1,7 @@
 //! A stream of numbers for each environment, episode and parameter, which costs some nanoseconds to enter anywhere.
 
 use crate::sim2real::Seed;
+use crate::sim2real::split_mix::{mixed, open_unit, with};
 use rand::Rng;
 
 /// What is drawn for: part of what a stream depends on.
@@ -32,26 +33,10 @@ impl DrawKey {
 /// of what is drawn, and on nothing else: neither on how many environments there are, nor on what else is drawn, nor on threads.
 ///
 /// A generator with a state would have to be made anew for each environment and parameter, which for `ChaCha8Rng` takes longer
-/// than all of a draw. Here a number is a hash of its coordinates, by the finalizer of SplitMix64 (Steele, Lea and Flood, "Fast
-/// splittable pseudorandom number generators", OOPSLA 2014, with Stafford's mixing constants 13).
+/// than all of a draw. Here a number is a hash of its coordinates, by the finalizer of SplitMix64.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Streams {
     key: u64,
-}
-
-/// The odd number nearest to 2^64 over the golden ratio, the increment of SplitMix64.
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-
-/// Mixes all bits of `z` into all bits.
-pub(in crate::sim2real) const fn mixed(z: u64) -> u64 {
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-/// `key` and one number more.
-const fn with(key: u64, number: u64) -> u64 {
-    mixed(key ^ mixed(number.wrapping_add(GOLDEN)).wrapping_mul(GOLDEN))
 }
 
 impl Streams {
@@ -82,14 +67,10 @@ pub(super) fn name_key(name: &str) -> u64 {
     Seed(0).child(name).0
 }
 
-/// The number in (0, 1), neither end ever, of the environment and the parameter of these keys: one of 2^52, evenly apart.
+/// The number in (0, 1), neither end ever, of the environment and the parameter of these keys.
 #[inline]
 pub(super) fn uniform(environment: u64, name: u64) -> f64 {
-    // The bits become those of a number from 1 to 2, 2^-52 apart: exact, and sooner done than a conversion.
-    const ONE: u64 = 1.0_f64.to_bits();
-    const HALF_A_STEP: f64 = 0.5 / (1_u64 << 52) as f64;
-    let bits = mixed(environment.wrapping_add(name)) >> 12;
-    (f64::from_bits(ONE | bits) - 1.0) + HALF_A_STEP
+    open_unit(mixed(environment.wrapping_add(name)))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 
 use super::elementary::exp_minus;
 use super::pixel::{Pixel, pixel};
+use crate::sim2real::split_mix::scattered;
 
 /// 64 bits for each number under a key.
 ///
@@ -18,10 +19,7 @@ pub(super) struct Counter {
 
 impl Counter {
     pub fn new(key: u64) -> Self {
-        let key = key.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let key = (key ^ key >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let key = (key ^ key >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        Self { start: key ^ key >> 31 }
+        Self { start: scattered(key) }
     }
 
     #[inline]
