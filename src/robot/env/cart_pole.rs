@@ -169,6 +169,9 @@ pub fn cart_pole_env(
     }
     if setting.assembly.mechanisms().next().is_some() || setting.randomization.is_some() {
         widen(&mut about);
+    } else {
+        // What is observed is true.
+        about.info.clear();
     }
     match wires(&setting) {
         Some(wires) => Ok(Box::new(Fast::new(lanes, about, task, setting, wires, timing))),
@@ -279,7 +282,7 @@ impl VecEnv for Fast {
     }
 
     fn info(&self, channel: usize, values: &mut [f64]) {
-        values.iter_mut().enumerate().for_each(|(lane, value)| *value = self.lanes.state(lane)[channel]);
+        self.lanes.tell(channel, values);
     }
 
     fn privileged(&self, parameter: usize, values: &mut [f64]) {

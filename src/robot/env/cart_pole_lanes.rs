@@ -170,6 +170,14 @@ impl CartPoleLanes {
         [own.position[k], own.velocity[k], own.angle[k], own.spin[k]]
     }
 
+    /// Writes component `which` of the state, one a lane.
+    pub fn tell(&self, which: usize, values: &mut [f64]) {
+        for (state, values) in self.states.iter().zip(values.chunks_mut(BLOCK)) {
+            let row = [&state.position, &state.velocity, &state.angle, &state.spin][which];
+            values.copy_from_slice(&row[..values.len()]);
+        }
+    }
+
     /// Takes a step in all lanes by `actions`, 0 or 1 each, and writes what is observed and whether the episode is over. With the widest
     /// vectors the processor has: the bits are the same with any.
     pub fn step(&mut self, actions: &[i64], observations: &mut [f32], terminated: &mut [bool]) {
