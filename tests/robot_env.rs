@@ -128,8 +128,6 @@ fn at_rest(_: f64) -> Options {
 #[test]
 fn they_move_as_gymnasiums_do() {
     follow(CART_POLE, &golden().cart_pole, &Options::new(), corner);
-    let silent = Options::new().with("twin", "[[mechanism]]\nname = \"noise\"\nstd = 0.0\n");
-    follow(CART_POLE, &golden().cart_pole, &silent, corner);
     follow(PENDULUM, &golden().pendulum, &Options::new(), at_rest);
 }
 
