@@ -1,94 +1,218 @@
-"""Steps a second of the cart-pole through Python: this package's, and Gymnasium's.
+"""What a step of an environment costs through Python: this package's, Gymnasium's, PufferLib's, gym-anytrading's, gym-trading-env's.
 
-    python python/benches/environments.py [--seconds 2] [--repeats 5]
+    python python/benches/environments.py [--seconds 0.3] [--repeats 9]
 
-Prints a table in Markdown: the median over the repeats of nanoseconds of CPU time a step of one lane, and their range. Actions are drawn
-before the clock starts; episodes that end are reset by the environments themselves.
+Prints tables in Markdown: the median over the repeats of nanoseconds of processor time a step of one lane, with the quartiles, and each
+peer's median over that of this package. Those of a table take turns, so that all of them meet the same machine. Actions are drawn before
+the clock starts; episodes that end are reset, within the time. Peers that cannot be had here are left out, with a word why.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.metadata
 import platform
 import statistics
+import sys
 import time
+from collections.abc import Callable
 
 import gymnasium
 import numpy as np
+import peers
 
 import trueup
 from trueup import envs
 
-ID = "trueup/CartPole-v0"
+CART_POLE = "trueup/CartPole-v0"
+#: A delay of up to two steps, noise of the position's sensor, and three parameters of which each episode draws its own.
+DRAWN = """
+[[mechanism]]
+name = "command_delay"
+seconds = 0.02
+[[mechanism]]
+name = "noise"
+std = 0.01
+[[randomize.parameter]]
+mechanism = "command_delay"
+parameter = "seconds"
+distribution = "uniform"
+low = 0.0
+high = 0.04
+[[randomize.parameter]]
+mechanism = "noise"
+parameter = "std"
+distribution = "uniform"
+low = 0.0
+high = 0.02
+[[randomize.parameter]]
+parameter = "gravity"
+distribution = "uniform"
+low = 0.9
+high = 1.1
+relative = true
+"""
+
+#: Takes so many steps; what is made of a number of lanes.
+Run = Callable[[int], None]
 
 
-def steps(env, step, lanes, seconds):
-    """Nanoseconds of CPU time a step of a lane."""
-    rng = np.random.default_rng(0)
-    actions = [rng.integers(2, size=lanes) for _ in range(64)]
+def single(env, actions: list) -> Run:
+    """Steps of a single environment, with resets."""
     env.reset(seed=0)
-    count, began, started = 0, time.process_time(), time.perf_counter()
-    while time.perf_counter() - started < seconds:
-        for action in actions:
-            step(action)
-        count += len(actions)
-    return 1e9 * (time.process_time() - began) / (count * lanes)
+    count = len(actions)
+
+    def run(steps: int) -> None:
+        step, reset = env.step, env.reset
+        for k in range(steps):
+            _, _, terminated, truncated, _ = step(actions[k % count])
+            if terminated or truncated:
+                reset()
+
+    return run
 
 
-def fresh(lanes):
-    env = envs.make_vec(ID, lanes)
-    return env, env.step
+def vector(env, step: Callable, lanes: int, kind=np.int64) -> Run:
+    """Steps of many lanes, which reset themselves."""
+    rng = np.random.default_rng(0)
+    actions = [rng.integers(2, size=lanes).astype(kind) for _ in range(64)]
+    env.reset(seed=0)
+
+    def run(steps: int) -> None:
+        for k in range(steps):
+            step(actions[k % 64])
+
+    return run
 
 
-def quiet(lanes):
-    env = envs.make_vec(ID, lanes, info=False)
+def quiet(lanes: int, **options) -> Run:
+    env = envs.make_vec(CART_POLE, lanes, info=False, **options)
     buffers = (np.empty((lanes, 4), np.float32), np.empty(lanes), np.empty(lanes, np.bool_), np.empty(lanes, np.bool_))
-    return env, lambda actions: env.step_into(actions, *buffers)
+    return vector(env, lambda actions: env.step_into(actions, *buffers), lanes)
 
 
-def bound(lanes):
-    env = envs.BoundEnvironment(ID, lanes)
-
-    def step(actions):
-        env.actions[:] = actions
-        env.step()
-
-    return env, step
+def fresh(lanes: int) -> Run:
+    env = envs.make_vec(CART_POLE, lanes)
+    return vector(env, env.step, lanes)
 
 
-def gymnasium_vector(lanes):
+def bound(lanes: int, **options) -> Run:
+    env = envs.BoundEnvironment(CART_POLE, lanes, actions=np.zeros(lanes, np.int32), **options)
+    return vector(env, env.step, lanes, np.int32)
+
+
+def in_numpy(lanes: int) -> Run:
     env = gymnasium.make_vec("CartPole-v1", lanes)
-    return env, env.step
+    return vector(env, env.step, lanes)
 
 
-def gymnasium_sync(lanes):
+def one_after_another(lanes: int) -> Run:
     env = gymnasium.make_vec("CartPole-v1", lanes, vectorization_mode="sync")
-    return env, env.step
+    return vector(env, env.step, lanes)
 
 
-KINDS = {
-    "trueup, `step`": (fresh, (1, 16, 256, 4096)),
-    "trueup, `step_into`, without info": (quiet, (1, 16, 256, 4096)),
-    "trueup, `BoundEnvironment`": (bound, (1, 16, 256, 4096)),
-    "gymnasium, its own vector in NumPy": (gymnasium_vector, (1, 16, 256, 4096)),
-    "gymnasium, `SyncVectorEnv`": (gymnasium_sync, (1, 16, 256)),
+def puffer(lanes: int) -> Run:
+    env = peers.PufferCartPole(lanes)
+    return vector(env, env.step, lanes, np.float32)
+
+
+def choices() -> list[int]:
+    return [int(way) for way in np.random.default_rng(0).integers(2, size=4096)]
+
+
+def targets(kind: Callable) -> list:
+    """Another position at most steps."""
+    return [kind(k) for k in np.random.default_rng(0).integers(3, size=4096)]
+
+
+TABLES: dict[str, list[tuple[str, int, Callable[[], Run]]]] = {
+    "One cart-pole, by `gymnasium.make`": [
+        ("trueup/CartPole-v0", 1, lambda: single(gymnasium.make(CART_POLE), choices())),
+        ("Gymnasium's CartPole-v1", 1, lambda: single(gymnasium.make("CartPole-v1"), choices())),
+    ],
+    "One cart-pole, on buffers that were bound": [
+        ("`BoundEnvironment`", 1, lambda: bound(1)),
+        ("PufferLib's", 1, lambda: puffer(1)),
+    ],
+    "4,096 cart-poles": [
+        ("`BoundEnvironment`", 4096, lambda: bound(4096)),
+        ("`step_into`, without info", 4096, lambda: quiet(4096)),
+        ("`step`", 4096, lambda: fresh(4096)),
+        ("PufferLib's", 4096, lambda: puffer(4096)),
+        ("Gymnasium's own vector in NumPy", 4096, lambda: in_numpy(4096)),
+    ],
+    "4,096 cart-poles with a delay, noise and parameters drawn for each episode, beside PufferLib's bare ones": [
+        ("`BoundEnvironment`", 4096, lambda: bound(4096, twin=DRAWN)),
+        ("PufferLib's", 4096, lambda: puffer(4096)),
+    ],
+    "16 cart-poles": [
+        ("`step_into`, without info", 16, lambda: quiet(16)),
+        ("`step`", 16, lambda: fresh(16)),
+        ("Gymnasium's own vector in NumPy", 16, lambda: in_numpy(16)),
+        ("Gymnasium's `SyncVectorEnv`", 16, lambda: one_after_another(16)),
+    ],
+    "One market of bars, another position at most steps": [
+        (
+            "trueup/Trade-v0",
+            1,
+            lambda: single(gymnasium.make("trueup/Trade-v0"), targets(lambda k: np.array([k - 1], np.float32))),
+        ),
+        ("gym-anytrading's StocksEnv", 1, lambda: single(peers.anytrading(), targets(lambda k: int(k % 2)))),
+        ("gym-trading-env's TradingEnv", 1, lambda: single(peers.trading_env(), targets(int))),
+    ],
 }
+
+
+def measured(runs: list[tuple[int, Run]], seconds: float, repeats: int) -> list[list[float]]:
+    """Nanoseconds of processor time a step of a lane, of each run, taking turns."""
+    counts = []
+    for _, run in runs:
+        count, spent = 1, 0.0
+        while spent < seconds / 8:
+            began = time.process_time()
+            run(count)
+            spent = time.process_time() - began
+            count *= 2
+        counts.append(max(1, int(count / 2 * seconds / spent)))
+    told: list[list[float]] = [[] for _ in runs]
+    for _ in range(repeats):
+        for times, (lanes, run), count in zip(told, runs, counts, strict=True):
+            began = time.process_time()
+            run(count)
+            times.append(1e9 * (time.process_time() - began) / (count * lanes))
+    return told
+
+
+def table(title: str, rows: list[tuple[str, int, Callable[[], Run]]], seconds: float, repeats: int) -> None:
+    names, runs = [], []
+    for name, lanes, make in rows:
+        try:
+            runs.append((lanes, make()))
+            names.append(name)
+        except peers.Missing as missing:
+            print(f"{name} is left out: {missing}", file=sys.stderr)
+    told = measured(runs, seconds, repeats)
+    own = statistics.median(told[0])
+    print(f"\n## {title}\n\n| | ns a step of a lane, median (quartiles) | over the first |\n|---|---|---|")
+    for name, times in zip(names, told, strict=True):
+        middle = statistics.median(times)
+        low, _, high = statistics.quantiles(times, n=4)
+        print(f"| {name} | {middle:,.1f} ({low:,.1f} to {high:,.1f}) | {middle / own:.2f} |", flush=True)
+
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=2.0, help="length of a measurement [s]")
-    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=0.3, help="processor time of a measurement [s]")
+    parser.add_argument("--repeats", type=int, default=9)
     arguments = parser.parse_args()
-    versions = f"trueup {trueup.__version__}, gymnasium {gymnasium.__version__}, NumPy {np.__version__}, Python {platform.python_version()}"
-    print(f"{versions}; {platform.machine()}\n")
-    print("| cart-pole | 1 lane | 16 lanes | 256 lanes | 4096 lanes |\n|---|---|---|---|---|")
-    for name, (make, counts) in KINDS.items():
-        cells = []
-        for lanes in (1, 16, 256, 4096):
-            if lanes not in counts:
-                cells.append("")
-                continue
-            env, step = make(lanes)
-            times = [steps(env, step, lanes, arguments.seconds) for _ in range(arguments.repeats)]
-            cells.append(f"{statistics.median(times):,.0f} ns ({min(times):,.0f} to {max(times):,.0f})")
-        print(f"| {name} | {' | '.join(cells)} |", flush=True)
+    print("# Environments through Python, beside their peers\n")
+    print("`./x environments` measures this anew. Nanoseconds of processor time a step of one lane, resets within; those of a table take turns.\n")
+    versions = [f"trueup {trueup.__version__}", f"Python {platform.python_version()}", f"NumPy {np.__version__}"]
+    for name in ("gymnasium", "gym-anytrading", "gym-trading-env"):
+        try:
+            versions.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    print(f"{', '.join(versions)}, PufferLib {peers.PUFFER} (its cart-pole in C, built with the flags of its setup.py); {platform.machine()}.")
+    for title, rows in TABLES.items():
+        table(title, rows, arguments.seconds, arguments.repeats)
