@@ -105,6 +105,117 @@ fn a_rollout_is_the_same_at_any_number_of_threads() {
     }
 }
 
+/// Rows `t,u,...` of a motion by Heun's method in steps of 1 ms, written every 20 ms with what a sensor adds.
+fn motion<const N: usize>(
+    seconds: f64,
+    mut state: [f64; N],
+    command: impl Fn(f64) -> f64,
+    slope: impl Fn(&[f64; N], f64) -> [f64; N],
+    seen: &[(&str, usize)],
+) -> String {
+    let names: Vec<&str> = seen.iter().map(|(name, _)| *name).collect();
+    let mut text = format!("t,u,{}\n", names.join(","));
+    for row in 0..(seconds / 0.02) as usize {
+        let t = row as f64 * 0.02;
+        let u = command(t);
+        let noise = |k: usize| 1e-3 * (((row * 31 + k * 17) % 23) as f64 / 11.0 - 1.0);
+        let values = seen.iter().map(|(_, k)| format!("{:.6}", state[*k] + noise(*k)));
+        text += &format!("{t:.3},{u},{}\n", values.collect::<Vec<_>>().join(","));
+        for _ in 0..20 {
+            let first = slope(&state, u);
+            let there = std::array::from_fn(|k| state[k] + 1e-3 * first[k]);
+            let second = slope(&there, u);
+            state = std::array::from_fn(|k| state[k] + 5e-4 * (first[k] + second[k]));
+        }
+    }
+    text
+}
+
+/// Friction of the cart of 0.8 N s/m, under a pole that hangs and swings.
+fn swinging() -> String {
+    let (mass, pole, half, gravity, friction, hinge) = (1.0, 0.2, 0.4, 9.81, 0.8, 0.01);
+    let slope = |s: &[f64; 4], u: f64| {
+        let [_, v, q, w] = *s;
+        let (sin, cos) = q.sin_cos();
+        // Both equations of motion at once: [[mass + pole, m l cos], [m l cos, 4/3 m l^2]] (a, q'') = right-hand sides.
+        let (a11, a12, a22) = (mass + pole, pole * half * cos, 4.0 / 3.0 * pole * half * half);
+        let (b1, b2) = (5.0 * u - friction * v + pole * half * w * w * sin, pole * gravity * half * sin - hinge * w);
+        let det = a11 * a22 - a12 * a12;
+        [v, (b1 * a22 - b2 * a12) / det, w, (a11 * b2 - a12 * b1) / det]
+    };
+    let push = |t: f64| if (0.7 * t) as i64 % 2 == 0 { 0.6 } else { -0.6 };
+    motion(6.0, [0.0, 0.0, std::f64::consts::PI, 0.0], push, slope, &[("x", 0), ("a", 2)])
+}
+
+const SWINGING: &str = "
+[twin]
+model = \"cart_pole\"
+[parameters]
+cart_mass     = { value = 1.0, unit = \"kg\" }
+pole_mass     = { value = 0.2, unit = \"kg\" }
+half_length   = { value = 0.4, unit = \"m\" }
+gravity       = { value = 9.81, unit = \"m/s^2\" }
+cart_friction = { value = 0.5, unit = \"N s/m\" }
+pole_friction = { value = 0.01, unit = \"N m s\" }
+gain          = { value = 5.0, unit = \"N per unit\" }
+[channels]
+command  = { column = \"u\" }
+position = { column = \"x\", unit = \"m\" }
+angle    = { column = \"a\", unit = \"rad\" }
+";
+
+/// Two tanks, of which the upper's outflow is 0.3 m^0.5/s.
+fn filling() -> String {
+    let slope = |s: &[f64; 2], u: f64| {
+        let (upper, lower) = (s[0].max(0.0).sqrt(), s[1].max(0.0).sqrt());
+        [0.4 * u - 0.3 * upper, 0.25 * upper - 0.2 * lower]
+    };
+    let pump = |t: f64| if (t / 8.0) as i64 % 2 == 0 { 1.2 } else { 0.5 };
+    motion(40.0, [1.0, 1.0], pump, slope, &[("level", 1)])
+}
+
+const FILLING: &str = "
+[twin]
+model = \"tanks\"
+[parameters]
+upper_outflow = { value = 0.25, unit = \"m^0.5/s\" }
+lower_inflow  = { value = 0.25, unit = \"m^0.5/s\" }
+lower_outflow = { value = 0.2, unit = \"m^0.5/s\" }
+pump_gain     = { value = 0.4, unit = \"m/s per unit\" }
+[channels]
+command = { column = \"u\" }
+level   = { column = \"level\", unit = \"m\" }
+";
+
+/// Draws around the truth hold the recording, and draws beside it do not.
+#[test]
+fn cart_poles_and_tanks_are_rolled_out_over_draws() {
+    let plants = [
+        (SWINGING, swinging(), "cart_friction", ["0.4", "1.2"], ["0.0", "0.3"]),
+        (FILLING, filling(), "upper_outflow", ["0.2", "0.4"], ["0.1", "0.2"]),
+    ];
+    for (twin, recording, parameter, around, beside) in plants {
+        let scene = Folder::with(&[("rows.csv", &recording)]);
+        for (name, [low, high]) in [("around", around), ("beside", beside)] {
+            let drawn = format!(
+                "[[randomize.parameter]]\nparameter = \"{parameter}\"\ndistribution = \"uniform\"\nlow = {low}\nhigh = {high}\n"
+            );
+            fs::write(scene.path(&format!("{name}.toml")), format!("{twin}{drawn}")).unwrap();
+            let command = format!("rollout {name}.toml --recording rows.csv --draws 100 --out {name} --json");
+            let (code, out, err) = scene.run(&command);
+            assert_eq!(code, 0, "{err}");
+            let rolled: Value = serde_json::from_str(&out).unwrap();
+            assert_eq!(rolled["covered"], name == "around", "{parameter}, {name}: {rolled}");
+            assert_eq!(rolled["drawn"][0]["name"], parameter);
+            let draws = Table::read(scene.path(name).join("draws.parquet")).unwrap().floats(parameter).unwrap();
+            let [low, high]: [f64; 2] = [low, high].map(|text| text.parse().unwrap());
+            assert!(draws.len() == 100 && draws.iter().flatten().all(|value| (low..=high).contains(value)));
+            let page = String::from_utf8(scene.bytes(&format!("{name}/report.html"))).unwrap();
+            assert!(page.contains("var(--band)") && !page.contains("NaN"));
+        }
+    }
+}
+
 const EXECUTION: &str = "
 [[randomize.parameter]]
 mechanism = 'half_spread'

@@ -67,6 +67,8 @@ fn a_model_and_states_are_written_and_not_over_others() {
     let table = trueup::io::Table::read(folder.path().join("found/states.parquet")).unwrap();
     assert_eq!(table.names(), ["ts", "value", "state", "by_then_0", "by_then_1"]);
     assert_eq!(table.rows(), 100);
+    let page = std::fs::read_to_string(folder.path().join("found/report.html")).unwrap();
+    assert!(page.contains("flow: 2 states and") && page.contains("1899-01-01T00:00:00Z") && !page.contains("NaN"), "{page}");
     let refused = run(folder.path(), &arguments);
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("--force"));

@@ -22,6 +22,7 @@ mod paper;
 mod prove;
 mod reconcile;
 mod regimes;
+mod regimes_output;
 mod rollout;
 mod screen;
 mod stop;

@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use crate::io::{InputError, OutputFolder, OutputTable, Overwrite, Table, TimeFormat, listed};
-use crate::report::quantity::{number, percent};
+use crate::io::{InputError, OutputFolder, Overwrite, Table, TimeFormat, listed};
 use crate::sim2real::regime::{
     Assumed, Cost, Cusum, CusumSettings, Degrees, Division, Family, Filter, Fit, Observations, Penalty, Prior, RegimeError,
     RunLengths, Settings, fit, fit_states,
 };
 use crate::sim2real::{Seed, Timestamp};
 
-use super::screen::{Screen, titled, written};
+use super::regimes_output::{by_row, page, told};
+use super::screen::{Screen, written};
 use super::stop::{Outcome, Stop};
 
 /// Most states that `--states auto` tries.
@@ -52,7 +52,7 @@ pub(super) struct Regimes {
     /// How changes are looked for: over the whole series, or row by row
     #[arg(long, value_enum, default_value = "pelt")]
     changes: Changes,
-    /// Folder to write into: regimes.json, model.toml and states.parquet, a row for each of the series
+    /// Folder to write into: regimes.json, model.toml, report.html and states.parquet, a row for each of the series
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write over files that exist
@@ -78,7 +78,7 @@ enum Model {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
 #[value(rename_all = "snake_case")]
 #[serde(rename_all = "snake_case")]
-enum Changes {
+pub(super) enum Changes {
     /// The best division of the whole series by mean and variance, exactly
     Pelt,
     /// Bayesian run lengths, a change expected every 1000 rows
@@ -103,59 +103,59 @@ fn states(text: &str) -> Result<States, String> {
 }
 
 #[derive(Serialize)]
-struct Listing<'a> {
-    schema: &'static str,
-    column: &'a str,
-    returns: bool,
-    rows: usize,
-    observed: usize,
-    log_likelihood: f64,
-    bic: f64,
-    converged: bool,
-    iterations: usize,
-    states: Vec<StateRow>,
-    tried: Vec<TriedRow>,
-    method: Changes,
-    changes: Vec<ChangeRow>,
+pub(super) struct Listing<'a> {
+    pub schema: &'static str,
+    pub column: &'a str,
+    pub returns: bool,
+    pub rows: usize,
+    pub observed: usize,
+    pub log_likelihood: f64,
+    pub bic: f64,
+    pub converged: bool,
+    pub iterations: usize,
+    pub states: Vec<StateRow>,
+    pub tried: Vec<TriedRow>,
+    pub method: Changes,
+    pub changes: Vec<ChangeRow>,
 }
 
 #[derive(Serialize)]
-struct StateRow {
-    mean: f64,
-    std: Option<f64>,
-    degrees: Option<f64>,
-    share: f64,
+pub(super) struct StateRow {
+    pub mean: f64,
+    pub std: Option<f64>,
+    pub degrees: Option<f64>,
+    pub share: f64,
     /// None of a state that is never left.
-    expected_rows: Option<f64>,
-    now: f64,
-    collapsed: bool,
+    pub expected_rows: Option<f64>,
+    pub now: f64,
+    pub collapsed: bool,
 }
 
 #[derive(Serialize)]
-struct TriedRow {
-    states: usize,
-    log_likelihood: f64,
-    bic: f64,
+pub(super) struct TriedRow {
+    pub states: usize,
+    pub log_likelihood: f64,
+    pub bic: f64,
 }
 
 #[derive(Serialize)]
-struct ChangeRow {
-    row: usize,
-    time: Option<String>,
-    mean: f64,
-    std: f64,
+pub(super) struct ChangeRow {
+    pub row: usize,
+    pub time: Option<String>,
+    pub mean: f64,
+    pub std: f64,
 }
 
 /// The series, and what its rows are called.
-struct Series {
-    column: String,
-    values: Vec<f64>,
+pub(super) struct Series {
+    pub column: String,
+    pub values: Vec<f64>,
     /// Data row of the file of the first value.
-    first: usize,
-    times: Times,
+    pub first: usize,
+    pub times: Times,
 }
 
-enum Times {
+pub(super) enum Times {
     Instants(Vec<Timestamp>),
     Seconds(Vec<f64>),
     None,
@@ -168,7 +168,7 @@ impl Regimes {
             Some(path) => {
                 let overwrite = if self.force { Overwrite::Force } else { Overwrite::Refuse };
                 let folder = OutputFolder::create(path, overwrite)?;
-                folder.check_free(&["regimes.json", "model.toml", "states.parquet"])?;
+                folder.check_free(&["regimes.json", "model.toml", "states.parquet", "report.html"])?;
                 Some(folder)
             }
             None => None,
@@ -192,6 +192,7 @@ impl Regimes {
             folder.file("model.toml", model.as_bytes())?;
             let filtered = found.model.filter(observations).map_err(refused)?;
             folder.table("states.parquet", &by_row(&series, &path, &filtered))?;
+            folder.file("report.html", page(&series, &listing, &changes, &path, &filtered).render()?.as_bytes())?;
         }
         match folder {
             Some(folder) => {
@@ -351,73 +352,9 @@ fn default_column(table: &Table) -> Result<String, InputError> {
 }
 
 /// Mean and standard deviation of what is not NaN.
-fn moments(values: &[f64]) -> (f64, f64) {
+pub(super) fn moments(values: &[f64]) -> (f64, f64) {
     let known = || values.iter().filter(|x| !x.is_nan());
     let count = (known().count() as f64).max(1.0);
     let mean = known().sum::<f64>() / count;
     (mean, (known().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt())
-}
-
-/// A row for each of the series: its value, its state, and the probability of each state by then.
-fn by_row(series: &Series, path: &[usize], filtered: &[f64]) -> OutputTable {
-    let mut table = OutputTable::new();
-    let times = series.first..series.first + path.len();
-    match &series.times {
-        Times::Instants(instants) => table = table.times("ts", instants[times].iter().copied()),
-        Times::Seconds(seconds) => table = table.floats("t", seconds[times].iter().copied()),
-        Times::None => {}
-    }
-    let states = filtered.len() / path.len();
-    table = table
-        .floats("value", series.values.iter().map(|x| (!x.is_nan()).then_some(*x)))
-        .integers("state", path.iter().map(|state| *state as i64));
-    for state in 0..states {
-        let probabilities = filtered.iter().skip(state).step_by(states).copied();
-        table = table.floats(&format!("by_then_{state}"), probabilities);
-    }
-    table
-}
-
-fn told(screen: &Screen, listing: &Listing) -> String {
-    let mut states = screen.table(["state", ">mean", ">std", ">share", ">expected rows", ">now", ""]);
-    let endless = || "\u{221e}".to_owned();
-    for (number_of, state) in listing.states.iter().enumerate() {
-        let mut remarks = vec![];
-        if let Some(degrees) = state.degrees {
-            remarks.push(format!("{} degrees of freedom", number(degrees)));
-        }
-        if state.collapsed {
-            remarks.push("no regime: it holds hardly a row, or rows that are all but equal".to_owned());
-        }
-        states.add_row([
-            number_of.to_string(),
-            number(state.mean),
-            state.std.map_or_else(endless, number),
-            percent(state.share),
-            state.expected_rows.map_or_else(endless, number),
-            percent(state.now),
-            remarks.join("; "),
-        ]);
-    }
-    let mut changes = screen.table([">row", "time", ">mean after", ">std after"]);
-    for change in &listing.changes {
-        let time = change.time.clone().unwrap_or_default();
-        changes.add_row([(change.row + 1).to_string(), time, number(change.mean), number(change.std)]);
-    }
-    let what = if listing.returns { "log returns of " } else { "" };
-    let converged = if listing.converged { "" } else { "; the fit has not converged" };
-    let title =
-        format!("States of {what}`{}`, {} rows (BIC {}{converged})", listing.column, listing.rows, number(listing.bic));
-    let mut text = titled(&title, &states);
-    if listing.tried.len() > 1 {
-        let mut tried = screen.table([">states", ">log-likelihood", ">BIC"]);
-        for row in &listing.tried {
-            tried.add_row([row.states.to_string(), format!("{:.1}", row.log_likelihood), format!("{:.1}", row.bic)]);
-        }
-        text += &titled("Numbers of states that were tried", &tried);
-    }
-    if listing.changes.is_empty() {
-        return text + "\nNo change was found.\n";
-    }
-    text + &titled("Changes", &changes)
 }

@@ -1,5 +1,7 @@
 //! Many runs of one thing over time, as bands.
 
+use super::data_time::{Cut, DataTime};
+
 /// A fan chart: the median of many draws, the bands that hold parts of them, and what they are held against.
 ///
 /// Source: fan charts as the Bank of England's Inflation Report has had them since February 1996 (Britton, Fisher and Whitley,
@@ -29,6 +31,22 @@ pub enum FanTime {
     Date(Vec<i64>),
     /// Seconds.
     Seconds(Vec<f64>),
+    /// Numbers of rows, of what has no times.
+    Rows(Vec<f64>),
+}
+
+impl FanTime {
+    /// Places on the x axis, what was cut where they are dates, and the axis' label.
+    pub(super) fn axis(&self) -> (Vec<f64>, Option<Vec<Cut>>, &'static str) {
+        match self {
+            Self::Date(time) => {
+                let DataTime { places, cuts } = DataTime::of(time);
+                (places, Some(cuts), "date (UTC)")
+            }
+            Self::Seconds(time) => (time.clone(), None, "time [s]"),
+            Self::Rows(rows) => (rows.clone(), None, "row"),
+        }
+    }
 }
 
 /// A band of a fan.

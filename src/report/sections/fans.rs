@@ -2,7 +2,6 @@
 
 use minijinja::{Value, context};
 
-use crate::report::data_time::DataTime;
 use crate::report::fan::{Fan, FanTime};
 use crate::report::plot::{Curve, Ink, Mark, Plot, Scale};
 use crate::report::quantity::{axis, whole_percent};
@@ -58,13 +57,7 @@ impl Section for Fans<'_> {
 }
 
 fn plot(k: usize, fan: &Fan, columns: usize) -> Value {
-    let (time, cuts) = match &fan.time {
-        FanTime::Date(time) => {
-            let DataTime { places, cuts } = DataTime::of(time);
-            (places, Some(cuts))
-        }
-        FanTime::Seconds(time) => (time.clone(), None),
-    };
+    let (time, cuts, x_label) = fan.time.axis();
     // Both ends of a band stand at the same places.
     let twice: Vec<f64> = time.iter().chain(&time).copied().collect();
     let some = |values: &[f64]| values.iter().map(|v| Some(*v)).collect::<Vec<_>>();
@@ -80,7 +73,7 @@ fn plot(k: usize, fan: &Fan, columns: usize) -> Value {
     let within = span(fan).map(|(low, high)| (low - 2.0 * (high - low).max(1e-12), high + 2.0 * (high - low).max(1e-12)));
     let plot = Plot {
         alt: format!("{}: median, bands and nominal over time", fan.caption),
-        x_label: if cuts.is_some() { "date (UTC)".into() } else { "time [s]".into() },
+        x_label: x_label.into(),
         y_label: axis(&fan.quantity.0, &fan.quantity.1),
         shades: cuts.as_deref().map(gaps).unwrap_or_default(),
         scale: cuts.map_or(Scale::Number, Scale::Date),

@@ -32,6 +32,7 @@ mod reliability;
 mod remarks;
 mod round_trips;
 mod scatters;
+mod states_over_time;
 mod traces;
 
 pub(super) use all_figures::AllFigures;
@@ -65,4 +66,5 @@ pub(super) use reliability::ReliabilityPlot;
 pub(super) use remarks::Remarks;
 pub(super) use round_trips::RoundTrips;
 pub(super) use scatters::Scatters;
+pub(super) use states_over_time::StatesOverTime;
 pub(super) use traces::Traces;
