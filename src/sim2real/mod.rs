@@ -5,6 +5,7 @@
 //! Recording -> identify -> diagnose (where, name, model, prove) -> Diagnosis -> trued twin
 //! ```
 
+mod any_twin;
 mod assembly;
 mod check;
 mod check_lanes;

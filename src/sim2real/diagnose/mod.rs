@@ -59,6 +59,7 @@ use prove::Contest;
 use rivals::Place;
 use select::Selection;
 
+use super::any_twin::{AnyStimulus, AnyTwin, any_recordings};
 use super::{Candidate, ChannelWeight, Clock, Recording, Seed, Signs, Twin};
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
@@ -155,6 +156,17 @@ pub(super) struct Answered<T> {
     facts: words::Facts,
 }
 
+impl Answered<AnyTwin> {
+    /// The answer to the twin `like` it was asked of.
+    fn of_its_kind<T: Twin>(self, like: &T) -> Answered<T> {
+        let Self { outcome, added, facts } = self;
+        let Outcome { diagnosis, trued, values, std, correlation, comparisons, profiles, excitation } = outcome;
+        let trued = trued.of_its_kind(like);
+        let outcome = Outcome { diagnosis, trued, values, std, correlation, comparisons, profiles, excitation };
+        Answered { outcome, added, facts }
+    }
+}
+
 /// The same of recordings that show one thing.
 fn of_one<T: Twin>(
     twin: &T,
@@ -169,11 +181,11 @@ fn of_one<T: Twin>(
     let found = Found { signs, of: twin.recognized(&signs), of_steps, lost };
     let quiet = twin.quiet();
     if signs.repeated <= 0.0 {
-        return followed(&quiet, recordings, held_out, &found, seed, progress);
+        return answered(&quiet, recordings, held_out, &found, seed, progress);
     }
     let channel = twin.channels().first().map(|c| c.name.clone()).unwrap_or_default();
     let cleaned = [recordings, held_out].map(|all| recognize::without_repeats(twin, all, &channel));
-    followed(&quiet, &cleaned[0], &cleaned[1], &found, seed, progress)
+    answered(&quiet, &cleaned[0], &cleaned[1], &found, seed, progress)
 }
 
 /// What the recordings show by themselves.
@@ -187,7 +199,7 @@ pub(super) struct Found {
 }
 
 /// The same of a twin that is followed, beside what was found without following it.
-fn followed<T: Twin>(
+fn answered<T: Twin>(
     twin: &T,
     recordings: &[Recording<T::Stimulus>],
     held_out: &[Recording<T::Stimulus>],
@@ -195,6 +207,19 @@ fn followed<T: Twin>(
     seed: Seed,
     progress: Progress<'_>,
 ) -> Answered<T> {
+    let [recordings, held_out] = [recordings, held_out].map(any_recordings);
+    followed(&AnyTwin::new(twin.clone()), &recordings, &held_out, found, seed, progress).of_its_kind(twin)
+}
+
+/// The same of a twin of any kind.
+fn followed(
+    twin: &AnyTwin,
+    recordings: &[Recording<AnyStimulus>],
+    held_out: &[Recording<AnyStimulus>],
+    found: &Found,
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Answered<AnyTwin> {
     progress("dividing the recordings", 0, 1);
     let evidence = Evidence::divide(twin, recordings, held_out);
     let candidates = recognize::fixed(twin.candidates(recordings));
@@ -305,6 +330,18 @@ pub fn calibrate<T: Twin>(
     twin: &T,
     recordings: &[Recording<T::Stimulus>],
     held_out: &[Recording<T::Stimulus>],
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Calibration {
+    let [recordings, held_out] = [recordings, held_out].map(any_recordings);
+    refitted(&AnyTwin::new(twin.clone()), &recordings, &held_out, seed, progress)
+}
+
+/// The same of a twin of any kind.
+fn refitted(
+    twin: &AnyTwin,
+    recordings: &[Recording<AnyStimulus>],
+    held_out: &[Recording<AnyStimulus>],
     seed: Seed,
     progress: Progress<'_>,
 ) -> Calibration {

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::sim2real::any_twin::{AnyStimulus, AnyTwin, any_recording};
 use crate::sim2real::diagnose::{channel_weights, settled};
 use crate::sim2real::{Measured, Part, Recording, Seed, Thetas, Trajectory, Twin};
 
@@ -47,12 +48,23 @@ pub fn ensemble<T: Twin>(
     seed: Seed,
     tell: &(dyn Fn(usize) + Sync),
 ) -> Vec<Predicted> {
-    let quiet = twin.quiet();
+    predicted(&AnyTwin::new(twin.quiet()), nominal, lanes, &any_recording(recording.clone()), seed, tell)
+}
+
+/// The same of a twin of any kind, which draws nothing itself.
+fn predicted(
+    quiet: &AnyTwin,
+    nominal: &[f64],
+    lanes: &[Vec<f64>],
+    recording: &Recording<AnyStimulus>,
+    seed: Seed,
+    tell: &(dyn Fn(usize) + Sync),
+) -> Vec<Predicted> {
     let part = Part::whole(recording);
-    let weights = channel_weights(&quiet, std::slice::from_ref(recording));
+    let weights = channel_weights(quiet, std::slice::from_ref(recording));
     let followed = |some: &[Vec<f64>]| -> Vec<Trajectory> {
         let start = |values: &Vec<f64>| -> Vec<f64> {
-            values.iter().copied().chain(settled(&quiet, values, &part, &weights)).collect()
+            values.iter().copied().chain(settled(quiet, values, &part, &weights)).collect()
         };
         let whole: Vec<Vec<f64>> = some.iter().map(start).collect();
         let out = quiet.rollout(&Thetas::from_lanes(&whole), recording, part.followed(), seed);
