@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import io
-import json
+import re
 import shutil
 import subprocess
 import sysconfig
 import tarfile
 import urllib.error
+import urllib.parse
 import urllib.request
 from pathlib import Path
 
@@ -52,15 +53,17 @@ def _puffer_source() -> Path:
     place = _PLACE / f"pufferlib-{PUFFER}" / "pufferlib" / "ocean"
     if place.is_dir():
         return place
+    index = "https://pypi.org/simple/pufferlib/"
     try:
-        with urllib.request.urlopen(f"https://pypi.org/pypi/pufferlib/{PUFFER}/json", timeout=60) as answer:
-            files = json.load(answer)["urls"]
-        source = next(file for file in files if file["packagetype"] == "sdist")
-        with urllib.request.urlopen(source["url"], timeout=300) as answer:
+        with urllib.request.urlopen(index, timeout=60) as answer:
+            listed = re.search(rf'href="([^"]*/pufferlib-{re.escape(PUFFER)}\.tar\.gz)#sha256=(\w+)"', answer.read().decode())
+        if listed is None:
+            raise Missing(f"the package index lists no source of {PUFFER}")
+        with urllib.request.urlopen(urllib.parse.urljoin(index, listed[1]), timeout=300) as answer:
             packed = answer.read()
-    except (urllib.error.URLError, StopIteration, KeyError, json.JSONDecodeError) as error:
+    except urllib.error.URLError as error:
         raise Missing(f"its source cannot be had ({error})") from None
-    if hashlib.sha256(packed).hexdigest() != source["digests"]["sha256"]:
+    if hashlib.sha256(packed).hexdigest() != listed[2]:
         raise Missing("its source is not what the index says it is")
     wanted = (f"pufferlib-{PUFFER}/pufferlib/ocean/cartpole/", f"pufferlib-{PUFFER}/pufferlib/ocean/env_binding.h")
     with tarfile.open(fileobj=io.BytesIO(packed)) as archive:

@@ -208,8 +208,8 @@ impl Lanes {
         let told = done.and_then(|()| {
             let observed = PyArray1::from_slice(py, &row);
             let info = self.info_of_one(py)?;
-            let shape = &self.looked_at().about().observation.shape;
-            let observed = if shape.len() == 1 { observed.into_any() } else { observed.reshape(shape.clone())?.into_any() };
+            let shape = self.looked_at().about().observation.shape.clone();
+            let observed = if shape.len() == 1 { observed.into_any() } else { observed.reshape(shape)?.into_any() };
             (observed, reward[0], terminated[0], truncated[0], info).into_pyobject(py)
         });
         self.row = row;

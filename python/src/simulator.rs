@@ -249,24 +249,6 @@ pub struct ScriptedSimulator {
 
 #[pymethods]
 impl ScriptedSimulator {
-    /// What `fit` makes of the recordings, with a callable that Ctrl-C ends.
-    fn fitted(
-        &self,
-        py: Python<'_>,
-        recordings: Vec<RecordingRow<'_>>,
-        held_out: Vec<RecordingRow<'_>>,
-        progress: Option<Py<PyAny>>,
-        fit: impl FnOnce(&Script, &[Recording<Inputs>], &[Recording<Inputs>], Progress<'_>) -> Value + Send,
-    ) -> PyResult<String> {
-        let (recordings, held_out) = (self.recordings(recordings), self.recordings(held_out));
-        let told = work::outside(py, |course| {
-            let script = Script { course: course.clone(), ..self.script.clone() };
-            let listener = course.listener(progress);
-            fit(&script, &recordings, &held_out, &|step, done, of| listener(step, done, of))
-        })?;
-        Ok(told.to_string())
-    }
-
     #[new]
     #[allow(clippy::too_many_arguments)]
     fn new(
@@ -352,6 +334,24 @@ impl ScriptedSimulator {
 }
 
 impl ScriptedSimulator {
+    /// What `fit` makes of the recordings, with a callable that Ctrl-C ends.
+    fn fitted(
+        &self,
+        py: Python<'_>,
+        recordings: Vec<RecordingRow<'_>>,
+        held_out: Vec<RecordingRow<'_>>,
+        progress: Option<Py<PyAny>>,
+        fit: impl FnOnce(&Script, &[Recording<Inputs>], &[Recording<Inputs>], Progress<'_>) -> Value + Send,
+    ) -> PyResult<String> {
+        let (recordings, held_out) = (self.recordings(recordings), self.recordings(held_out));
+        let told = work::outside(py, |course| {
+            let script = Script { course: course.clone(), ..self.script.clone() };
+            let listener = course.listener(progress);
+            fit(&script, &recordings, &held_out, &|step, done, of| listener(step, done, of))
+        })?;
+        Ok(told.to_string())
+    }
+
     fn recordings(&self, rows: Vec<RecordingRow<'_>>) -> Vec<Recording<Inputs>> {
         let one = |(name, time, inputs, channels): RecordingRow<'_>| Recording {
             name,

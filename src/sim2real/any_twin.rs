@@ -1,5 +1,6 @@
-//! Twins of any kind behind one type: identification and the steps of a diagnosis are thousands of lines, which compilers then go through once, and not once
-//! for each kind of twin. A step asks little of a twin but to follow recordings, beside which a call through a table costs nothing.
+//! Twins of any kind behind one type: identification and the steps of a diagnosis are thousands of lines, which compilers then go
+//! through once, and not once for each kind of twin. A step asks little of a twin but to follow recordings, beside which a call
+//! through a table costs nothing.
 
 use std::any::Any;
 use std::ops::Range;

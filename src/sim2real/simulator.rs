@@ -14,7 +14,7 @@ use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, 
 /// sample for each row followed; a lane's bits depend on neither the lanes beside it nor the thread.
 pub trait Simulator: Send + Sync {
     /// What drives it.
-    type Stimulus: Clone + Send + Sync;
+    type Stimulus: Clone + Send + Sync + 'static;
     /// Name.
     fn name(&self) -> String;
     /// The channels it simulates.
@@ -90,7 +90,7 @@ pub struct Candidate {
 }
 
 /// A simulator that can be given mechanisms it lacks.
-pub trait Twin: Simulator + Clone {
+pub trait Twin: Simulator + Clone + 'static {
     /// The forms of all mechanisms it could be given and does not model yet, as far as `recordings` can tell of them.
     fn candidates(&self, recordings: &[Recording<Self::Stimulus>]) -> Vec<Candidate>;
     /// The twin with one more mechanism, whose parameters follow those it has.

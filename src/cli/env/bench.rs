@@ -11,7 +11,7 @@ use super::{entry, refused};
 use crate::io::{InputError, hint_among};
 use crate::rl::{
     About, Actions, AutoresetMode, Buffers, Checked, EnvError, Episode, OptionAbout, OptionKind, OptionValue, Options,
-    Space, Stream, StreamName, Threads, VecEnv, Which,
+    Space, SplitMix64, StreamName, Threads, VecEnv, Which,
 };
 
 /// Measure how fast an environment is: steps a second, with random actions and automatic resets
@@ -193,7 +193,7 @@ impl Run {
 }
 
 /// An action evenly drawn from the space; within -1 and 1 where that has no bounds.
-fn draw(space: &Space, actor: &mut Stream, reals: &mut Vec<f32>, choices: &mut Vec<i64>) {
+fn draw(space: &Space, actor: &mut SplitMix64, reals: &mut Vec<f32>, choices: &mut Vec<i64>) {
     match space {
         Space::Box(space) => {
             for (low, high) in space.low.iter().zip(&space.high) {

@@ -60,7 +60,7 @@ use rivals::Place;
 use select::Selection;
 
 use super::any_twin::{AnyStimulus, AnyTwin, any_recordings};
-use super::{Candidate, ChannelWeight, Clock, Recording, Seed, Signs, Twin};
+use super::{Candidate, ChannelWeight, Clock, Recording, Seed, Signs, Simulator, Twin};
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);

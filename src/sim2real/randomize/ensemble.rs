@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::sim2real::any_twin::{AnyStimulus, AnyTwin, any_recording};
 use crate::sim2real::diagnose::{channel_weights, settled};
-use crate::sim2real::{Measured, Part, Recording, Seed, Thetas, Trajectory, Twin};
+use crate::sim2real::{Measured, Part, Recording, Seed, Simulator, Thetas, Trajectory, Twin};
 
 /// One channel of a recording, as a twin and its draws foretell it.
 #[derive(Debug, Clone, PartialEq)]
