@@ -125,6 +125,10 @@ def targets(kind: Callable) -> list:
     return [kind(k) for k in np.random.default_rng(0).integers(3, size=4096)]
 
 
+def trade(**options) -> Run:
+    return single(gymnasium.make("trueup/Trade-v0", **options), targets(lambda k: np.array([k - 1], np.float32)))
+
+
 TABLES: dict[str, list[tuple[str, int, Callable[[], Run]]]] = {
     "One cart-pole, by `gymnasium.make`": [
         ("trueup/CartPole-v0", 1, lambda: single(gymnasium.make(CART_POLE), choices())),
@@ -152,11 +156,8 @@ TABLES: dict[str, list[tuple[str, int, Callable[[], Run]]]] = {
         ("Gymnasium's `SyncVectorEnv`", 16, lambda: one_after_another(16)),
     ],
     "One market of bars, another position at most steps": [
-        (
-            "trueup/Trade-v0",
-            1,
-            lambda: single(gymnasium.make("trueup/Trade-v0"), targets(lambda k: np.array([k - 1], np.float32))),
-        ),
+        ("trueup/Trade-v0, without info", 1, lambda: trade(info=False)),
+        ("trueup/Trade-v0, with twelve figures of info", 1, trade),
         ("gym-anytrading's StocksEnv", 1, lambda: single(peers.anytrading(), targets(lambda k: int(k % 2)))),
         ("gym-trading-env's TradingEnv", 1, lambda: single(peers.trading_env(), targets(int))),
     ],

@@ -48,14 +48,15 @@ pub struct Lanes {
     size: usize,
     /// Of a single environment: what it observed last, which the array it gives out is made of.
     row: Vec<f32>,
-    /// Names of its info.
+    /// Whether its steps give info, and under which names.
+    informs: bool,
     names: PyOnceLock<Vec<Py<PyString>>>,
 }
 
 impl Lanes {
     fn of(driver: Driver) -> Self {
         let (lanes, size) = (driver.lanes(), driver.about().observation.size());
-        Self { driver: Mutex::new(driver), lanes, size, row: vec![0.0; size], names: PyOnceLock::new() }
+        Self { driver: Mutex::new(driver), lanes, size, row: vec![0.0; size], informs: true, names: PyOnceLock::new() }
     }
 
     /// A step by an array of actions, real numbers as float32, choices as int64.
@@ -220,8 +221,9 @@ impl Lanes {
     fn info_of_one<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let info = PyDict::new(py);
         let driver = self.looked_at();
-        let names = self.names.get_or_init(py, || {
-            driver.about().info.iter().map(|channel| PyString::intern(py, &channel.name).unbind()).collect()
+        let names = self.names.get_or_init(py, || match self.informs {
+            false => Vec::new(),
+            true => driver.about().info.iter().map(|channel| PyString::intern(py, &channel.name).unbind()).collect(),
         });
         for (channel, name) in names.iter().enumerate() {
             let mut value = [0.0];
@@ -276,14 +278,20 @@ impl Lanes {
         Ok(PyArray2::from_vec2(py, &rows)?)
     }
 
+    /// Whether steps of a single environment give info.
+    #[setter]
+    fn set_informs(&mut self, informs: bool) {
+        (self.informs, self.names) = (informs, PyOnceLock::new());
+    }
+
     /// The same lanes once more, which go on with the same bits.
     fn copy(&self) -> Self {
-        Self::of(self.looked_at().clone())
+        Self { informs: self.informs, ..Self::of(self.looked_at().clone()) }
     }
 
     /// Goes on as `other`.
     fn load(&mut self, other: &Self) {
-        *self = other.copy();
+        *self = Self { informs: self.informs, ..other.copy() };
     }
 
     /// Makes lane `to` a copy of lane `from`.

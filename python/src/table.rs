@@ -160,6 +160,9 @@ pub fn columns_of<'py>(py: Python<'py>, table: &Bound<'py, PyAny>) -> PyResult<B
 
 /// The parts of a column as one array of NumPy.
 fn joined<'py>(py: Python<'py>, field: &Field, parts: &[&ArrayRef]) -> PyResult<Bound<'py, PyAny>> {
+    if let Some(integers) = integers(field.data_type(), parts) {
+        return Ok(PyArray1::from_vec(py, integers).into_any());
+    }
     if let Some(numbers) = numbers(field.data_type(), parts) {
         return Ok(PyArray1::from_vec(py, numbers).into_any());
     }
@@ -172,6 +175,23 @@ fn joined<'py>(py: Python<'py>, field: &Field, parts: &[&ArrayRef]) -> PyResult<
         return Err(error::refused(py, &message, "convert the column, or leave it out"));
     };
     py.import("numpy")?.call_method1("array", (PyList::new(py, texts)?, "object"))
+}
+
+/// Integers up to this size are floating-point numbers as well.
+const EXACT: i64 = 1 << 53;
+
+/// Integers that would lose digits as floating-point numbers, such as nanoseconds since the epoch; the least integer where there is none.
+fn integers(kind: &DataType, parts: &[&ArrayRef]) -> Option<Vec<i64>> {
+    let all: Vec<Option<i64>> = match kind {
+        DataType::Int64 => parts.iter().flat_map(|part| part.as_primitive::<types::Int64Type>().iter()).collect(),
+        DataType::UInt64 => {
+            let own = parts.iter().flat_map(|part| part.as_primitive::<types::UInt64Type>().iter());
+            own.map(|value| value.map(i64::try_from).transpose()).collect::<Result<_, _>>().ok()?
+        }
+        _ => return None,
+    };
+    let long = all.iter().flatten().any(|value| value.unsigned_abs() > EXACT.unsigned_abs());
+    long.then(|| all.into_iter().map(|value| value.unwrap_or(i64::MIN)).collect())
 }
 
 /// Numbers of any type as floating-point numbers.

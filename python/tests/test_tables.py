@@ -34,6 +34,18 @@ def test_a_table_knows_its_columns(result):
     assert repr(result.fills).startswith("<trueup.Table of ")
 
 
+def test_nanoseconds_keep_their_digits(tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    pytest.importorskip("pyarrow.parquet")
+    stamps = [1_722_951_031_605_537_605, None, 1_722_951_031_799_170_221]
+    columns = columns_of(pa.table({"decided_at": stamps, "unsigned": pa.array(stamps, pa.uint64()), "qty": [1, None, 3]}))
+    for name in ("decided_at", "unsigned"):
+        assert columns[name].dtype == np.int64 and columns[name][[0, 2]].tolist() == [stamps[0], stamps[2]]
+    assert columns["qty"].dtype == np.float64 and np.isnan(columns["qty"][1])
+    trueup.recording.write_table(tmp_path / "stamps.parquet", columns)
+    assert pa.parquet.read_table(tmp_path / "stamps.parquet")["decided_at"].to_pylist() == stamps
+
+
 def test_columns_are_the_same_wherever_they_come_from(rng):
     pa, pl, pd = pytest.importorskip("pyarrow"), pytest.importorskip("polars"), pytest.importorskip("pandas")
     t, q = np.arange(10.0), rng.normal(size=10)

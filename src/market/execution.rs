@@ -242,6 +242,7 @@ impl Plant for Execution {
             output: if spread > 0.0 { spread } else { 1.0 },
             quantum: recordings.iter().filter_map(|recording| recording.stimulus.quantum()).reduce(f64::min),
             delay: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_delay()).collect()),
+            delays: usual(recordings.iter().filter_map(|recording| recording.stimulus.usual_delay())),
             age: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_age()).collect()),
             ..Typical::default()
         }
@@ -319,6 +320,17 @@ impl Execution {
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
+}
+
+/// One value of several, each with its standard deviation, the surer the weightier. None of none.
+fn usual(all: impl Iterator<Item = [f64; 2]>) -> Option<[f64; 2]> {
+    // What never varied is known to the last digit.
+    let weighed: Vec<[f64; 2]> = all.map(|[value, std]| [value, std.max(1e-9 * value.abs()).powi(-2)]).collect();
+    let whole: f64 = weighed.iter().map(|[_, weight]| weight).sum();
+    (whole > 0.0 && whole.is_finite()).then(|| {
+        let value = weighed.iter().map(|[value, weight]| value * weight).sum::<f64>() / whole;
+        [value, whole.sqrt().recip()]
+    })
 }
 
 /// The largest multiple of `lot` that is in `quantity`; all of it where there are no lots. What is short of one by no more than

@@ -16,7 +16,7 @@ use super::reversal::{Came, discount};
 use super::shown_age::{ShownAge, shown_age};
 use super::{
     InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, PriceAssumption, Role, Seen, Tape, cost_bps, fee_bps,
-    own_print, shown_delay,
+    own_print, shown_delay, usual_delay,
 };
 
 mod aspects;
@@ -57,6 +57,7 @@ pub struct OrderLog {
     shows_own_orders: bool,
     own_prints: Vec<Option<Timestamp>>,
     shown_delay: Option<f64>,
+    usual_delay: Option<[f64; 2]>,
     shown_age: Option<f64>,
     notes: Vec<String>,
 }
@@ -121,7 +122,8 @@ impl OrderLog {
             .map(|(o, e)| own_print(market.tape.prints(), o.side, o.decided_at, e.first_fill?, &e.pieces))
             .collect();
         let delays = in_flight.iter().zip(&own_prints).filter_map(|(o, p)| Some(p.as_ref()?.seconds_since(o.decided_at)));
-        let shown_delay = shown_delay(delays.collect());
+        let delays: Vec<f64> = delays.collect();
+        let (shown_delay, usual_delay) = (shown_delay(delays.clone()), usual_delay(delays));
         let fills = executions.iter().zip(&own_prints);
         let traded: Vec<Traded> = fills.map(|(execution, print)| Traded::of(*print, execution.first_fill)).collect();
         let tick_size = market.instrument.tick_size;
@@ -164,6 +166,7 @@ impl OrderLog {
             shows_own_orders,
             market,
             shown_delay,
+            usual_delay,
             shown_age: None,
             own_prints,
             orders: in_flight,
@@ -205,6 +208,7 @@ impl OrderLog {
             shows_own_orders,
             own_prints,
             shown_delay: None,
+            usual_delay: None,
             shown_age: None,
             notes: Vec::new(),
         };
@@ -353,6 +357,12 @@ impl OrderLog {
     #[must_use]
     pub fn shown_delay(&self) -> Option<f64> {
         self.shown_delay
+    }
+
+    /// The median of the times from decision to the orders' own prints, and its standard deviation [s], where there are enough.
+    #[must_use]
+    pub fn usual_delay(&self) -> Option<[f64; 2]> {
+        self.usual_delay
     }
 
     /// The largest number of lots of which all that was filled of an order is a multiple [units], where there is one.

@@ -76,6 +76,7 @@ pub(super) fn typical<S: AsRef<[f64]>>(recordings: &[Recording<S>], channel: &st
         resolution: recordings.iter().map(step).fold(0.0, f64::max),
         duration: recordings.iter().filter_map(|r| Some(r.time.last()? - r.time.first()?)).fold(0.0, f64::max),
         delay: None,
+        delays: None,
         quantum: None,
         age: None,
     }

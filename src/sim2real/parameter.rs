@@ -21,6 +21,8 @@ pub struct Parameter {
     /// Where fits begin, beside `nominal`. A value that does nothing has no gradient to follow, so a mechanism names
     /// at least one that does something.
     pub starts: Vec<f64>,
+    /// What time stamps or the like show of it by themselves, better than any fit could: value and standard deviation.
+    pub shown: Option<[f64; 2]>,
     /// Whether the output is differentiable in it, to within the step of a finite difference.
     pub smooth: bool,
     /// Whether its effect grows in proportion to it, from the nominal value on, where it is small: a screen then solves
@@ -48,6 +50,7 @@ impl Parameter {
             upper: f64::INFINITY,
             prior: None,
             starts: Vec::new(),
+            shown: None,
             smooth: true,
             linear: false,
             source: Cow::Borrowed(""),

@@ -205,6 +205,8 @@ pub struct Typical {
     pub duration: f64,
     /// The delay of commands that the recordings' own time stamps show [s], where they show it.
     pub delay: Option<f64>,
+    /// The same where delays differ: their median, and its standard deviation [s].
+    pub delays: Option<[f64; 2]>,
     /// The largest number of which all that was done of commands is a multiple, in their unit, where there is one.
     pub quantum: Option<f64>,
     /// The age of what commands were decided on that the recordings themselves show [s], where they show it.
@@ -222,6 +224,7 @@ impl Default for Typical {
             resolution: 0.01,
             duration: 20.0,
             delay: None,
+            delays: None,
             quantum: None,
             age: None,
         }

@@ -34,6 +34,8 @@ class Environment(gymnasium.Env):
     ----------
     identity : str
         Its id, such as ``"trueup/CartPole-v0"``.
+    info : bool
+        Whether steps give info; without, they are quicker.
     **options
         What can be set when it is made; ``about["options"]`` lists it with units and bounds. An environment of a market also has `run`: the
         path of a RUN.toml, whose data, venue and account it is then in, instead of data that are generated.
@@ -47,7 +49,7 @@ class Environment(gymnasium.Env):
 
     metadata: dict[str, Any] = {"render_modes": []}
 
-    def __init__(self, identity: str, render_mode: str | None = None, **options: Any):
+    def __init__(self, identity: str, render_mode: str | None = None, *, info: bool = True, **options: Any):
         if render_mode is not None:
             hint = "leave render_mode out"
             raise seeds.InputError(f"{identity} has nothing to render\n  hint: {hint}", hint=hint)
@@ -56,6 +58,7 @@ class Environment(gymnasium.Env):
             options["run"] = os.fspath(options["run"])
         self._identity, self._options = identity, dict(options)
         self._lanes = _trueup.Lanes(identity, 1, "Disabled", 1, self._options)
+        self._lanes.informs = self._informs = bool(info)
         #: What the environment is: title, spaces with names and units, info channels, options.
         self.about: dict[str, Any] = self._lanes.about()
         self.observation_space = spaces.box(self.about["observation"])
@@ -110,7 +113,7 @@ class Environment(gymnasium.Env):
 
     def branch(self) -> Environment:
         """Another environment, which goes on from here with the same bits."""
-        other = type(self)(self._identity, **self._options)
+        other = type(self)(self._identity, info=self._informs, **self._options)
         other.restore(self.snapshot())
         other.spec = self.spec
         return other
@@ -123,7 +126,7 @@ class Environment(gymnasium.Env):
 
     def __reduce__(self):
         # As EzPickle has it: a fresh one of the same arguments, which has to be reset.
-        return (_again, (type(self), (self._identity,), self._options, {"spec": self.spec}))
+        return (_again, (type(self), (self._identity,), {"info": self._informs, **self._options}, {"spec": self.spec}))
 
     def close(self) -> None:
         """Give up what it holds; a step or reset after that is an error."""

@@ -60,7 +60,8 @@ use rivals::Place;
 use select::Selection;
 
 use super::any_twin::{AnyStimulus, AnyTwin, any_recordings};
-use super::{Candidate, ChannelWeight, Clock, Recording, Seed, Signs, Simulator, Twin};
+use super::{Candidate, ChannelWeight, Clock, Parameter, Recording, Seed, Signs, Simulator, Twin};
+use crate::sim2real::identify::Fit;
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
@@ -250,6 +251,7 @@ fn followed(
         trued: (&selection.selected.twin, &trued.values),
     };
     let comparisons = prove::compared(&contest, inquiry.evidence, seed);
+    let known = shown(&trued, selection.selected.twin.parameters());
     let findings = verdict::Findings {
         fits: prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed),
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
@@ -257,7 +259,7 @@ fn followed(
         dependence: remainder::dependence(&inquiry, &selection.selected),
         foretold: remainder::foretold(&inquiry, &selection.selected),
         std: uncertainty::inflated(&inquiry, &selection.selected, &trued),
-        trued: trued.clone(),
+        trued: known.clone(),
         sampled: twin.clock() != Clock::Event,
         inexact: exact::inexact(&inquiry, &selection),
     };
@@ -282,7 +284,7 @@ fn followed(
     let facts = verdict::facts(&inquiry, &findings);
     let mut added: Vec<Candidate> = selection.selected.added.iter().map(|number| candidates[*number].clone()).collect();
     let mut correlation = trued.correlation(selection.selected.twin.parameters());
-    let (mut trued_twin, mut values, mut std) = (selection.selected.twin, trued.values, findings.std);
+    let (mut trued_twin, mut values, mut std) = (selection.selected.twin, known.values, findings.std);
     for candidate in seen {
         trued_twin = trued_twin.with(candidate);
         values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
@@ -295,6 +297,17 @@ fn followed(
     (fitted..values.len()).for_each(|k| correlation[(k, k)] = 1.0);
     let outcome = Outcome { diagnosis, trued: trued_twin, values, std, correlation, comparisons, profiles, excitation };
     Answered { outcome, added, facts }
+}
+
+/// The fit with what recordings show by themselves of its parameters. What they leave unexplained is told of the fit: to follow what was
+/// recorded it may need another value than the usual one, which whatever is simulated next is to have.
+fn shown(fit: &Fit, parameters: &[Parameter]) -> Fit {
+    let mut known = fit.clone();
+    for (k, [value, _]) in parameters.iter().enumerate().filter_map(|(k, p)| Some((k, p.shown?))) {
+        known.values[k] = value;
+        known.at_bound.retain(|at| *at != k);
+    }
+    known
 }
 
 /// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.

@@ -25,6 +25,9 @@ pub(super) fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesi
     let parameters = hypothesis.twin.parameters().iter().enumerate();
     let by_a_rule = exact::by_a_rule(inquiry, hypothesis, fit);
     let widened = |(k, p): (usize, &Parameter)| {
+        if let Some([_, std]) = p.shown {
+            return std;
+        }
         let std = fit.std[k] * factor;
         let of_another_form = k >= own && std > 0.0 && !by_a_rule.contains(&k);
         // Delays of signals are what they are; those of messages are drawn anew for each.

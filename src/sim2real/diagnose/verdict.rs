@@ -140,15 +140,38 @@ pub(super) fn recognized<T: Twin>(
     diagnosis.effects.extend(found.iter().map(|candidate| effects::seen(inquiry, of_what, candidate)));
 }
 
-/// The parameters that ended at a bound, those of mechanisms behind their mechanism's id.
-fn at_bound<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> Vec<String> {
+/// Names of all parameters, those of mechanisms behind their mechanism's id.
+fn names<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Vec<String> {
     let own = inquiry.twin.parameters().len();
     let added = selected.added.iter().flat_map(|number| {
         let candidate = &inquiry.candidates[*number];
         candidate.form.parameters.iter().map(|p| format!("{}.{}", candidate.about.name, p.name))
     });
-    let names = selected.twin.parameters()[..own].iter().map(|p| p.name.clone().into_owned()).chain(added);
-    names.enumerate().filter(|(k, _)| findings.trued.at_bound.contains(k)).map(|(_, name)| name).collect()
+    selected.twin.parameters()[..own].iter().map(|p| p.name.clone().into_owned()).chain(added).collect()
+}
+
+/// The parameters that ended at a bound.
+fn at_bound<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: &Findings) -> Vec<String> {
+    let names = names(inquiry, selected).into_iter().enumerate();
+    names.filter(|(k, _)| findings.trued.at_bound.contains(k)).map(|(_, name)| name).collect()
+}
+
+/// What is to be said of parameters that the recordings show by themselves, where a fit alone would say something else.
+fn shown<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Vec<String> {
+    let parameters = selected.twin.parameters().iter().zip(&selected.fit.values).zip(names(inquiry, selected));
+    parameters
+        .filter_map(|((p, fitted), name)| {
+            let [value, std] = p.shown?;
+            let unit = inquiry.twin.unit(&p.unit);
+            ((fitted - value).abs() > 2.0 * std).then(|| {
+                format!(
+                    "`{name}` is the usual one, {} {unit}, as time stamps show it; what was recorded is followed best with {} {unit}",
+                    words::figure(value, 3),
+                    words::figure(*fitted, 3)
+                )
+            })
+        })
+        .collect()
 }
 
 /// Ids of the mechanisms of which no form would show beside the twin alone.
@@ -271,6 +294,7 @@ fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: 
     let mut notes: Vec<String> = parts.flat_map(of).collect();
     let mut told = BTreeSet::new();
     notes.retain(|note| told.insert(note.clone()));
+    notes.extend(shown(inquiry, selected));
     let smooth = selected.fit.jacobian.ncols();
     if selected.fit.rank < smooth {
         notes.push(format!(

@@ -38,6 +38,7 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
         let starts: Vec<f64> = shown.into_iter().chain(self.starts.iter().copied()).collect();
         let mut seconds = Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(&starts);
         seconds.smooth = self.smooth;
+        seconds.shown = typical.delays.filter(|[delay, _]| *delay > 0.0 && *delay <= self.longest);
         Form::only(vec![seconds])
     }
 
