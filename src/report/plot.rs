@@ -32,6 +32,8 @@ pub(super) enum Ink {
     Bound,
     /// The middle of many draws.
     Median,
+    /// What a series keeps to for a while, beside the colours of its states.
+    Level,
     /// What a part of many draws lies within.
     Band,
     /// One of several things of a kind, told apart by its number.
@@ -53,6 +55,7 @@ impl Ink {
             Self::Loss => "loss",
             Self::Bound => "bound",
             Self::Median => "median",
+            Self::Level => "level",
             Self::Band => "band",
             Self::Member(k) => ["member-0", "member-1", "member-2", "member-3"][k % Self::MEMBERS],
         }

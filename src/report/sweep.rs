@@ -80,8 +80,11 @@ impl Listing {
     /// Which columns hold nothing but numbers.
     #[must_use]
     pub fn numbers(&self) -> Vec<bool> {
-        let signs = "+-\u{2212}\u{2013}";
-        let number = |cell: &String| cell.starts_with(|c: char| c.is_ascii_digit() || signs.contains(c));
+        let signs = "+-\u{2212}\u{2013}\u{221e}";
+        // Of what is "< 0.1 %" the number counts.
+        let number = |cell: &String| {
+            cell.trim_start_matches(['<', '>', ' ']).starts_with(|c: char| c.is_ascii_digit() || signs.contains(c))
+        };
         (0..self.heads.len()).map(|k| self.rows.iter().filter_map(|row| row.get(k)).all(number)).collect()
     }
 }

@@ -33,7 +33,7 @@ impl Section for StatesOverTime<'_> {
         let twice: Vec<f64> = time.iter().chain(&time).copied().collect();
         let spread = |side: f64| page.segments.iter().flat_map(move |s| vec![Some(s.mean + side * s.std); s.end - s.start]);
         let between = Curve { ink: Ink::Band, mark: Mark::Between, x: &twice, y: spread(-1.0).chain(spread(1.0)).collect() };
-        let means = Curve { ink: Ink::Median, mark: Mark::Step, x: &time, y: spread(0.0).collect() };
+        let means = Curve { ink: Ink::Level, mark: Mark::Step, x: &time, y: spread(0.0).collect() };
         let dots = (0..page.by_then.len()).map(|state| {
             let own = |(value, of): (&Option<f64>, &usize)| value.filter(|_| *of == state);
             let y = page.values.iter().zip(&page.path).map(own).collect();
@@ -42,7 +42,7 @@ impl Section for StatesOverTime<'_> {
         let series = Plot {
             alt: format!("{} in the colours of its states, with mean and deviation between changes", page.quantity),
             x_label: x_label.into(),
-            y_label: page.quantity.clone(),
+            y_label: String::new(),
             scale,
             curves: [between].into_iter().chain(dots).chain([means]).collect(),
             shades,
@@ -54,13 +54,13 @@ impl Section for StatesOverTime<'_> {
         };
         let line = |(state, y): (usize, &Vec<f64>)| Curve {
             ink: Ink::Member(state),
-            mark: Mark::Line,
+            // What is believed holds until more is known.
+            mark: Mark::Step,
             x: &time,
             y: y.iter().map(|p| Some(*p)).collect(),
         };
         let beliefs = Plot {
             alt: "probability of each state by then".into(),
-            y_label: "probability".into(),
             curves: page.by_then.iter().enumerate().map(line).collect(),
             within: Some((0.0, 1.0)),
             height: (220.0, 190.0),
@@ -74,6 +74,7 @@ impl Section for StatesOverTime<'_> {
             include_str!("../templates/states_over_time.html"),
             context! {
                 about => page.about.clone(),
+                quantity => &page.quantity,
                 members => members,
                 series => Value::from_safe_string(series.draw("series")),
                 beliefs => Value::from_safe_string(beliefs.draw("beliefs")),
@@ -109,7 +110,7 @@ mod tests {
             changes: Listing::default(),
         };
         let html = StatesOverTime { page: &page }.render().unwrap();
-        for colour in ["var(--member-0)", "var(--member-1)", "var(--median)", "var(--band)"] {
+        for colour in ["var(--member-0)", "var(--member-1)", "var(--level)", "var(--band)"] {
             assert!(html.contains(colour), "{colour}");
         }
         // On wide screens and narrow ones: the 59 values that there are, each a dot: a line of no length.
