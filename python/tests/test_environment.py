@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import tomllib
 import warnings
 
 import numpy as np
@@ -321,3 +322,39 @@ def test_whatever_the_interface_is_given_it_answers_or_raises():
             assert not isinstance(error, trueup.BugError), (method, arguments, keywords, error)
     assert len(played(single, 10, seed=1)) > 10
     assert vector.reset(seed=1)[0].shape == (3, 4)
+
+
+def test_a_market_is_that_of_a_run_file(bars_run):
+    env = envs.make("trueup/Trade-v0", run=bars_run)
+    _, began = env.reset(seed=1)
+    with open(bars_run, "rb") as file:
+        assert began["equity"] == tomllib.load(file)["run"]["cash"]
+    alike = envs.make("trueup/Trade-v0", run=str(bars_run))
+    alike.reset(seed=1)
+    for step in range(60):
+        action = np.array([1.0 if step % 20 < 10 else 0.0], np.float32)
+        ours, theirs = env.step(action), alike.step(action)
+        assert np.array_equal(ours[0], theirs[0]) and ours[1:] == theirs[1:]
+    assert ours[4]["fills"] > 0 and ours[4]["fees"] > 0 and ours[4]["time"] > 1.7e9
+    # Made by its id alone it is in another market.
+    elsewhere = envs.make("trueup/Trade-v0")
+    elsewhere.reset(seed=1)
+    assert elsewhere.step(action)[4]["time"] != ours[4]["time"]
+    with pytest.raises(FileNotFoundError, match="nowhere.toml"):
+        envs.make("trueup/Trade-v0", run="nowhere.toml")
+    with pytest.raises(trueup.InputError, match="path of a RUN.toml"):
+        envs.make("trueup/Trade-v0", run=3)
+    with pytest.raises(trueup.InputError, match="has no option `run`"):
+        envs.make("trueup/CartPole-v0", run=str(bars_run))
+
+
+def test_info_can_be_left_out():
+    told, silent = envs.make("trueup/Trade-v0"), envs.make("trueup/Trade-v0", info=False)
+    assert told.reset(seed=3)[1]["equity"] > 0 and silent.reset(seed=3)[1] == {}
+    action = np.array([0.5], np.float32)
+    ours, theirs = told.step(action), silent.step(action)
+    assert np.array_equal(ours[0], theirs[0]) and ours[1:4] == theirs[1:4] and theirs[4] == {} and len(ours[4]) > 5
+    # A snapshot of one goes on in the other, which stays as it was made.
+    silent.restore(told.snapshot())
+    assert silent.step(action)[4] == {} and pickle.loads(pickle.dumps(silent)).reset(seed=3)[1] == {}
+    assert silent.branch().step(action)[4] == {} and copy.deepcopy(told).step(action)[4]["steps"] == 2
