@@ -11,11 +11,15 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
+import os
 import platform
 import statistics
 import sys
 import time
 from collections.abc import Callable
+
+# Threads of linear algebra wait for work that never comes, on the processor's time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import gymnasium
 import numpy as np

@@ -4,8 +4,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArray1, PyReadwriteArrayDyn,
-    PyUntypedArray,
+    PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyReadwriteArray1,
+    PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -46,6 +46,8 @@ pub struct Lanes {
     driver: Mutex<Driver>,
     lanes: usize,
     size: usize,
+    /// Shapes of a lane's observation and action.
+    shapes: [Vec<usize>; 2],
     /// Of a single environment: what it observed last, which the array it gives out is made of.
     row: Vec<f32>,
     /// Whether its steps give info, and under which names.
@@ -56,7 +58,17 @@ pub struct Lanes {
 impl Lanes {
     fn of(driver: Driver) -> Self {
         let (lanes, size) = (driver.lanes(), driver.about().observation.size());
-        Self { driver: Mutex::new(driver), lanes, size, row: vec![0.0; size], informs: true, names: PyOnceLock::new() }
+        let acted = driver.about().action.as_box().map(|space| space.shape.clone()).unwrap_or_default();
+        let shapes = [driver.about().observation.shape.clone(), acted];
+        Self {
+            driver: Mutex::new(driver),
+            lanes,
+            size,
+            shapes,
+            row: vec![0.0; size],
+            informs: true,
+            names: PyOnceLock::new(),
+        }
     }
 
     /// A step by an array of actions, real numbers as float32, choices as int64.
@@ -70,6 +82,13 @@ impl Lanes {
         } else {
             Err(error::refused(py, "actions are no array of float32 or int64", "give one row a lane"))
         }
+    }
+
+    /// Whether an action is an array that can be read as it is.
+    fn is_row(&self, action: &Bound<'_, PyAny>) -> bool {
+        let array = action.cast_exact::<PyArrayDyn<f32>>();
+        let shape = &self.shapes[1];
+        array.is_ok_and(|array| !shape.is_empty() && array.shape() == shape.as_slice() && array.is_c_contiguous())
     }
 
     fn looked_at(&self) -> MutexGuard<'_, Driver> {
@@ -202,15 +221,19 @@ impl Lanes {
         let mut row = std::mem::take(&mut self.row);
         let mut out =
             Out { observations: &mut row, rewards: &mut reward, terminated: &mut terminated, truncated: &mut truncated };
-        let done = match plain(action) {
-            Some(choice) => drive(py, self.driven(), |driver| driver.step(Actions::Discrete(&[choice]), &mut out)),
-            None => read.call1((action,)).and_then(|actions| self.stepped(py, &actions, &mut out)),
+        let done = if let Some(choice) = plain(action) {
+            drive(py, self.driven(), |driver| driver.step(Actions::Discrete(&[choice]), &mut out))
+        } else if self.is_row(action) {
+            self.stepped(py, action, &mut out)
+        } else {
+            read.call1((action,)).and_then(|actions| self.stepped(py, &actions, &mut out))
         };
         let told = done.and_then(|()| {
             let observed = PyArray1::from_slice(py, &row);
             let info = self.info_of_one(py)?;
-            let shape = self.looked_at().about().observation.shape.clone();
-            let observed = if shape.len() == 1 { observed.into_any() } else { observed.reshape(shape)?.into_any() };
+            let shape = &self.shapes[0];
+            let observed =
+                if shape.len() == 1 { observed.into_any() } else { observed.reshape(shape.as_slice())?.into_any() };
             (observed, reward[0], terminated[0], truncated[0], info).into_pyobject(py)
         });
         self.row = row;

@@ -182,6 +182,19 @@ impl CartPoleLanes {
     /// vectors the processor has: the bits are the same with any.
     pub fn step(&mut self, actions: &[i64], observations: &mut [f32], terminated: &mut [bool]) {
         Arch::new().dispatch(Stepped { lanes: self, actions, observations, terminated });
+        self.rest();
+    }
+
+    /// Puts what only fills the last block back to rest: nobody resets it, and long angles take long.
+    fn rest(&mut self) {
+        let filled = self.count % BLOCK;
+        if filled > 0
+            && let Some(last) = self.states.last_mut()
+        {
+            for row in [&mut last.position, &mut last.velocity, &mut last.angle, &mut last.spin] {
+                row[filled..].fill(0.0);
+            }
+        }
     }
 
     /// Number of lanes.
