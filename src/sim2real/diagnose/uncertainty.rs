@@ -25,14 +25,11 @@ pub(super) fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesi
     let parameters = hypothesis.twin.parameters().iter().enumerate();
     let by_a_rule = exact::by_a_rule(inquiry, hypothesis, fit);
     let widened = |(k, p): (usize, &Parameter)| {
-        if let Some([_, std]) = p.shown {
-            return std;
-        }
-        let std = fit.std[k] * factor;
+        let (value, std) = p.shown.map_or((fit.values[k], fit.std[k] * factor), |[value, std]| (value, std));
         let of_another_form = k >= own && std > 0.0 && !by_a_rule.contains(&k);
         // Delays of signals are what they are; those of messages are drawn anew for each.
         let constant = p.unit == "s" && inquiry.twin.clock() != Clock::Event;
-        let relative = if constant { 0.0 } else { FORM * fit.values[k].abs() };
+        let relative = if constant { 0.0 } else { FORM * value.abs() };
         if of_another_form { (BEYOND_NOISE * std).hypot(relative) } else { std }
     };
     parameters.map(widened).collect()
