@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import io
+import os
 import re
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ import urllib.request
 from pathlib import Path
 
 import numpy as np
+from pip._internal.models.index import PyPI
 
 #: The version of PufferLib whose cart-pole is measured.
 PUFFER = "3.0.0"
@@ -53,7 +55,7 @@ def _puffer_source() -> Path:
     place = _PLACE / f"pufferlib-{PUFFER}" / "pufferlib" / "ocean"
     if place.is_dir():
         return place
-    index = "https://pypi.org/simple/pufferlib/"
+    index = f"{os.environ.get('PIP_INDEX_URL', PyPI.simple_url).rstrip('/')}/pufferlib/"
     try:
         with urllib.request.urlopen(index, timeout=60) as answer:
             listed = re.search(rf'href="([^"]*/pufferlib-{re.escape(PUFFER)}\.tar\.gz)#sha256=(\w+)"', answer.read().decode())
