@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use trueup::market::{
     Bar, Execution, InFlight, Instrument, Level, LogError, LogMarket, LoggedFill, LoggedOrder, MECHANISMS, OrderLog,
-    OrderType, Price, PriceAssumption, Print, Quotes, Role, Side, Tape,
+    OrderType, Price, PriceAssumption, Print, Quotes, Role, ShownDelay, Side, Tape,
 };
 use trueup::sim2real::{
     Assembly, Candidate, Plant, Recording, Seed, Simulator, Thetas, Timestamp, Twin, Typical, check_mechanism, check_plant,
@@ -257,7 +257,7 @@ fn what_earlier_rows_left_is_met_by_a_run_that_starts_in_the_middle() {
 fn spread_walk_delay_and_commission_add_up_to_what_was_paid() {
     let recording = full();
     let log = &recording.stimulus;
-    assert!((log.shown_delay().unwrap() - 0.2).abs() < 1e-9, "{:?}", log.shown_delay());
+    assert!((log.shown_delay().and_then(ShownDelay::constant).unwrap() - 0.2).abs() < 1e-9, "{:?}", log.shown_delay());
     assert!(log.own_prints().iter().all(Option::is_some));
     assert_eq!(log.notes(), ["the tape shows what the orders of the log did to the market"]);
     let whole = with(bare(), &recording, "half_spread", "fraction", 1.0);

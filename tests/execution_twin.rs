@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 use trueup::io::{InputError, TwinFile};
-use trueup::market::{Execution, OrderLog, execution_assembly, execution_twin};
+use trueup::market::{Execution, OrderLog, ShownDelay, execution_assembly, execution_twin};
 use trueup::sim2real::{Assembly, Candidate, Recording, Seed, Simulator, Thetas, Twin};
 
 const TWIN: &str = r#"
@@ -247,7 +247,7 @@ fn simulated_exchanges_are_explained_to_the_cent() {
     {
         let Some(folder) = abides(name) else { continue };
         let (bare, recording) = read(&folder).unwrap();
-        let shown = recording.stimulus.shown_delay().unwrap();
+        let shown = recording.stimulus.shown_delay().and_then(ShownDelay::constant).unwrap();
         println!("{name}: {} orders, shown delay {shown} s, notes {:?}", recording.len(), recording.stimulus.notes());
         assert!((shown - delay).abs() < 1e-7, "{name}: {shown}");
         let held_out = mean_error(&bare, &recording, recording.row_at_fraction(0.7));
@@ -269,7 +269,7 @@ fn orders_beyond_five_levels_are_left_out_and_the_rest_is_explained() {
     println!(
         "03: {} orders, shown delay {:?}, notes {:?}",
         recording.len(),
-        recording.stimulus.shown_delay(),
+        recording.stimulus.shown_delay().and_then(ShownDelay::constant),
         recording.stimulus.notes()
     );
     let found = [("half_spread", 1.0), ("book_walk", 1.0), ("command_delay", 0.001_000_014)];

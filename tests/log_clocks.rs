@@ -1,4 +1,5 @@
-//! Logs whose clock is not that of the tape: what is missing is to be named as with the right clock, and the clock is to be told.
+//! Logs whose clock is not that of the tape: what is missing is to be named as with the right clock, and the clock is to be told. And logs
+//! whose orders take a time of their own each.
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
 mod draws;
@@ -22,9 +23,9 @@ fn at(seconds: f64) -> Timestamp {
     Timestamp(1_722_951_000 * Timestamp::NANOS).plus_seconds(seconds)
 }
 
-/// What is found of 300 orders that are filled at the touch 200 ms after they are decided, in a log whose clock is so much behind that
+/// What is found of 300 orders that are filled at the touch after a way of their own [s] each, in a log whose clock is so much behind that
 /// of the tape [s].
-fn diagnosed(behind: f64) -> Diagnosis {
+fn diagnosed(behind: f64, way: impl Fn(&mut Draws) -> f64) -> Diagnosis {
     let mut draws = Draws(7);
     let (mut quotes, mut prints) = (Quotes::with_depth(1), Vec::new());
     let (mut orders, mut fills) = (Vec::new(), Vec::new());
@@ -46,7 +47,7 @@ fn diagnosed(behind: f64) -> Diagnosis {
                 kind: OrderType::Market,
                 seen_mid: None,
             });
-            on_its_way = Some((when + WAY, side, quantity));
+            on_its_way = Some((when + way(&mut draws), side, quantity));
             next = now + 4.0 + 12.0 * draws.uniform();
         }
         let arrives = on_its_way.take_if(|(time, ..): &mut (f64, Side, f64)| *time < now + 0.05);
@@ -79,7 +80,7 @@ fn names(diagnosis: &Diagnosis) -> Vec<&str> {
 #[test]
 fn names_and_delay_are_those_of_the_right_clock() {
     for behind in [0.0, 1.27] {
-        let diagnosis = diagnosed(behind);
+        let diagnosis = diagnosed(behind, |_| WAY);
         assert_eq!(names(&diagnosis), ["command_delay", "half_spread"], "{diagnosis:#?}");
         assert_eq!(diagnosis.verdict, Verdict::Named);
         let delay = diagnosis.effects.iter().find_map(|effect| effect.parameters.get("seconds")).unwrap().value;
@@ -93,8 +94,24 @@ fn names_and_delay_are_those_of_the_right_clock() {
 
 #[test]
 fn a_clock_that_is_ahead_hides_delays_and_nothing_else() {
-    let diagnosis = diagnosed(-3.0);
+    let diagnosis = diagnosed(-3.0, |_| WAY);
     assert_eq!((names(&diagnosis), diagnosis.verdict), (vec!["half_spread"], Verdict::Named), "{diagnosis:#?}");
     let notes = &diagnosis.checks.notes;
     assert!(notes.iter().any(|note| note.contains("s ahead of that of the tape")), "{notes:?}");
+}
+
+/// Orders that take .6 s in the median, and up to six times that: what is read at an order's own print speaks against no delay that is
+/// too long, so that a fit alone says 3 s and more.
+#[test]
+fn a_delay_that_is_drawn_is_that_of_the_orders_own_prints() {
+    let way = |draws: &mut Draws| {
+        let normal: f64 = (0..12).map(|_| draws.uniform()).sum::<f64>() - 6.0;
+        (0.6 * (0.8 * normal).exp()).clamp(0.05, 3.6)
+    };
+    let diagnosis = diagnosed(0.0, way);
+    assert!(names(&diagnosis).contains(&"command_delay"), "{diagnosis:#?}");
+    let delay = &diagnosis.effects.iter().find(|effect| effect.mechanism == "command_delay").unwrap().parameters["seconds"];
+    assert!((delay.value - 0.6).abs() < 2.0 * delay.std && delay.std < 0.15, "{delay:?}");
+    let told = diagnosis.checks.notes.iter().any(|note| note.contains("`command_delay.seconds` is the usual one"));
+    assert!(told, "{:?}", diagnosis.checks.notes);
 }

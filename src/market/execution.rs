@@ -6,7 +6,7 @@ use crate::sim2real::{
 };
 
 use super::foresight::{self, Foresight};
-use super::{Book, InFlight, OrderLog, Role, Side};
+use super::{Book, InFlight, OrderLog, Role, ShownDelay, Side};
 
 /// What an arriving order meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -233,6 +233,7 @@ impl Plant for Execution {
             .filter_map(|recording| recording.channel("cost"))
             .flat_map(|cost| cost.samples.iter().flatten().copied())
             .collect();
+        let delays = || recordings.iter().filter_map(|recording| recording.stimulus.shown_delay());
         let size = |values: Vec<f64>| median(values).filter(|v| *v > 0.0).unwrap_or(1.0);
         let mean = costs.iter().sum::<f64>() / costs.len().max(1) as f64;
         let spread = (costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / costs.len().max(1) as f64).sqrt();
@@ -241,8 +242,8 @@ impl Plant for Execution {
             effort: size(costs.iter().map(|cost| cost.abs()).collect()),
             output: if spread > 0.0 { spread } else { 1.0 },
             quantum: recordings.iter().filter_map(|recording| recording.stimulus.quantum()).reduce(f64::min),
-            delay: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_delay()).collect()),
-            delays: usual(recordings.iter().filter_map(|recording| recording.stimulus.usual_delay())),
+            delay: median(delays().filter_map(ShownDelay::constant).collect()),
+            delays: usual(delays().map(ShownDelay::estimate)),
             age: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_age()).collect()),
             ..Typical::default()
         }

@@ -166,7 +166,7 @@ pub use mechanism::MECHANISMS;
 pub use money::{Cash, Increments, MoneyError, Price, Quantity};
 pub use order::{InFlight, Posted, Role, Side};
 pub use order_log::{LogMarket, OrderLog};
-pub use own_print::{Piece, own_print, shown_delay, usual_delay};
+pub use own_print::{Piece, ShownDelay, own_print};
 #[cfg(feature = "io")]
 pub use preset::presets as market_presets;
 pub use price_assumption::PriceAssumption;

@@ -15,8 +15,8 @@ use super::queue_place::{Place, Places};
 use super::reversal::{Came, discount};
 use super::shown_age::{ShownAge, shown_age};
 use super::{
-    InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, PriceAssumption, Role, Seen, Tape, cost_bps, fee_bps,
-    own_print, shown_delay, usual_delay,
+    InFlight, Instrument, LogError, LogTable, LoggedFill, LoggedOrder, PriceAssumption, Role, Seen, ShownDelay, Tape,
+    cost_bps, fee_bps, own_print,
 };
 
 mod aspects;
@@ -56,8 +56,7 @@ pub struct OrderLog {
     aspect: Aspect,
     shows_own_orders: bool,
     own_prints: Vec<Option<Timestamp>>,
-    shown_delay: Option<f64>,
-    usual_delay: Option<[f64; 2]>,
+    shown_delay: Option<ShownDelay>,
     shown_age: Option<f64>,
     notes: Vec<String>,
 }
@@ -122,8 +121,7 @@ impl OrderLog {
             .map(|(o, e)| own_print(market.tape.prints(), o.side, o.decided_at, e.first_fill?, &e.pieces))
             .collect();
         let delays = in_flight.iter().zip(&own_prints).filter_map(|(o, p)| Some(p.as_ref()?.seconds_since(o.decided_at)));
-        let delays: Vec<f64> = delays.collect();
-        let (shown_delay, usual_delay) = (shown_delay(delays.clone()), usual_delay(delays));
+        let shown_delay = ShownDelay::of(delays.collect());
         let fills = executions.iter().zip(&own_prints);
         let traded: Vec<Traded> = fills.map(|(execution, print)| Traded::of(*print, execution.first_fill)).collect();
         let tick_size = market.instrument.tick_size;
@@ -166,7 +164,6 @@ impl OrderLog {
             shows_own_orders,
             market,
             shown_delay,
-            usual_delay,
             shown_age: None,
             own_prints,
             orders: in_flight,
@@ -208,7 +205,6 @@ impl OrderLog {
             shows_own_orders,
             own_prints,
             shown_delay: None,
-            usual_delay: None,
             shown_age: None,
             notes: Vec::new(),
         };
@@ -292,7 +288,7 @@ impl OrderLog {
     /// What order `row` found where it arrived by the delay the stamps show; without one, what it was decided on.
     pub(super) fn seen_on_arrival(&self, row: usize) -> Seen {
         let order = self.orders[row];
-        let arrives_at = order.decided_at.plus_seconds(self.shown_delay.unwrap_or(0.0));
+        let arrives_at = order.decided_at.plus_seconds(self.shown_delay.and_then(ShownDelay::constant).unwrap_or(0.0));
         Seen::by(&order.arriving(arrives_at), self.own_prints[row])
     }
 
@@ -353,16 +349,10 @@ impl OrderLog {
         &self.market.instrument
     }
 
-    /// The time from decision to the orders' own prints [s], where the stamps show one.
+    /// The time from decision to the orders' own prints, where the stamps show one.
     #[must_use]
-    pub fn shown_delay(&self) -> Option<f64> {
+    pub fn shown_delay(&self) -> Option<ShownDelay> {
         self.shown_delay
-    }
-
-    /// The median of the times from decision to the orders' own prints, and its standard deviation [s], where there are enough.
-    #[must_use]
-    pub fn usual_delay(&self) -> Option<[f64; 2]> {
-        self.usual_delay
     }
 
     /// The largest number of lots of which all that was filled of an order is a multiple [units], where there is one.

@@ -62,33 +62,45 @@ pub(super) fn shows(prints: &[Print], side: Side, fills: &[Piece]) -> bool {
 /// With fewer orders stamps show nothing.
 const ENOUGH: usize = 25;
 
-/// The delay between decision and own print the stamps show [s]: the median of `delays` [s], where at least 25 orders
-/// were found and the distance between their quartiles is less than a tenth of it.
-#[must_use]
-pub fn shown_delay(mut delays: Vec<f64>) -> Option<f64> {
-    if delays.len() < ENOUGH {
-        return None;
-    }
-    delays.sort_by(f64::total_cmp);
-    let quantile = |part: f64| delays[((delays.len() - 1) as f64 * part).round() as usize];
-    let median = quantile(0.5);
-    (quantile(0.75) - quantile(0.25) < 0.1 * median).then_some(median)
-}
-
-/// The delay between decision and own print that the stamps show where each order has another [s]: the median of `delays` [s], and its
-/// standard deviation, as that of a normal distribution of the same quartiles. None of fewer than 25 orders.
+/// How long orders take from their decisions to their own prints, as the stamps of many show it.
 ///
 /// An order that met the market later than a simulation assumes is read at its own print, so that no delay beyond the longest is
 /// refuted by any order: a fit finds one that is too long, where the stamps themselves tell which is the usual one.
-#[must_use]
-pub fn usual_delay(mut delays: Vec<f64>) -> Option<[f64; 2]> {
-    if delays.len() < ENOUGH {
-        return None;
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShownDelay {
+    /// Median [s].
+    pub median: f64,
+    /// Distance between the quartiles [s].
+    pub between_quartiles: f64,
+    /// Number of orders.
+    pub orders: usize,
+}
+
+impl ShownDelay {
+    /// What `delays` [s] show; none of fewer than 25 orders.
+    #[must_use]
+    pub fn of(mut delays: Vec<f64>) -> Option<Self> {
+        if delays.len() < ENOUGH {
+            return None;
+        }
+        delays.sort_by(f64::total_cmp);
+        let quantile = |part: f64| delays[((delays.len() - 1) as f64 * part).round() as usize];
+        let between_quartiles = quantile(0.75) - quantile(0.25);
+        Some(Self { median: quantile(0.5), between_quartiles, orders: delays.len() })
     }
-    delays.sort_by(f64::total_cmp);
-    let quantile = |part: f64| delays[((delays.len() - 1) as f64 * part).round() as usize];
-    let scatter = (quantile(0.75) - quantile(0.25)) / 1.349;
-    Some([quantile(0.5), (0.5 * std::f64::consts::PI / delays.len() as f64).sqrt() * scatter])
+
+    /// The delay [s], where it is the same for all: where the distance between the quartiles is less than a tenth of it.
+    #[must_use]
+    pub fn constant(self) -> Option<f64> {
+        (self.between_quartiles < 0.1 * self.median).then_some(self.median)
+    }
+
+    /// The median and its standard deviation [s], that of a normal distribution of the same quartiles.
+    #[must_use]
+    pub fn estimate(self) -> [f64; 2] {
+        let scatter = self.between_quartiles / 1.349;
+        [self.median, (0.5 * std::f64::consts::PI / self.orders as f64).sqrt() * scatter]
+    }
 }
 
 #[cfg(test)]
@@ -148,12 +160,13 @@ mod tests {
 
     #[test]
     fn a_delay_is_shown_by_many_orders_that_agree() {
-        assert_eq!(shown_delay(vec![0.25; 24]), None);
-        assert_eq!(shown_delay(vec![0.25; 25]), Some(0.25));
-        assert_eq!(shown_delay((1..=100).map(f64::from).collect()), None);
-        let [median, std] = usual_delay((1..=101).map(f64::from).collect()).unwrap();
+        assert_eq!(ShownDelay::of(vec![0.25; 24]), None);
+        let same = ShownDelay::of(vec![0.25; 25]).unwrap();
+        assert_eq!((same.constant(), same.estimate()), (Some(0.25), [0.25, 0.0]));
+        let drawn = ShownDelay::of((1..=101).map(f64::from).collect()).unwrap();
+        assert_eq!(drawn.constant(), None);
         // Of uniform draws over 100 the median's is 100 / (2 sqrt(n)) = 5.0; quartiles taken for a normal distribution's say 4.6.
+        let [median, std] = drawn.estimate();
         assert!((median - 51.0).abs() < 1e-12 && (4.0..5.5).contains(&std), "{median} +- {std}");
-        assert_eq!(usual_delay(vec![1.0; 24]), None);
     }
 }

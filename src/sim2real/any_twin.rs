@@ -59,40 +59,9 @@ impl<T: Twin> Kind<T> {
     }
 }
 
-/// What [`Twin`] and [`Simulator`] have, for a table of methods.
-trait Methods: Send + Sync {
+/// What makes a twin of a simulator, for a table of methods.
+trait Methods: Simulator<Stimulus = AnyStimulus> {
     fn any(&self) -> &dyn Any;
-    fn name(&self) -> String;
-    fn channels(&self) -> &[Channel];
-    fn parameters(&self) -> &[Parameter];
-    fn clock(&self) -> Clock;
-    fn initial_parameters(&self, recording: &Recording<AnyStimulus>, row: usize) -> Vec<Parameter>;
-    fn resolution(&self, recording: &Recording<AnyStimulus>, channel: &str) -> f64;
-    fn covariates(&self, recording: &Recording<AnyStimulus>) -> Vec<Covariate>;
-    fn notes(&self, recording: &Recording<AnyStimulus>) -> Vec<String>;
-    fn unit(&self, declared: &str) -> String;
-    fn rollout(
-        &self,
-        thetas: &Thetas,
-        recording: &Recording<AnyStimulus>,
-        rows: Range<usize>,
-        seed: Seed,
-    ) -> Vec<Trajectory>;
-    fn rollout_rejoined(
-        &self,
-        thetas: &Thetas,
-        recording: &Recording<AnyStimulus>,
-        rows: Range<usize>,
-        every: usize,
-        seed: Seed,
-    ) -> Option<Vec<Trajectory>>;
-    fn commands(&self, recording: &Recording<AnyStimulus>) -> Option<Vec<f64>>;
-    fn excited(
-        &self,
-        recording: &Recording<AnyStimulus>,
-        time: Vec<f64>,
-        commands: Vec<f64>,
-    ) -> Option<Recording<AnyStimulus>>;
     fn candidates(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate>;
     fn with(&self, candidate: &Candidate) -> AnyTwin;
     fn stepping(&self, seconds: f64) -> AnyTwin;
@@ -101,10 +70,8 @@ trait Methods: Send + Sync {
     fn modelled(&self) -> Vec<&'static str>;
 }
 
-impl<T: Twin> Methods for Kind<T> {
-    fn any(&self) -> &dyn Any {
-        &self.0
-    }
+impl<T: Twin> Simulator for Kind<T> {
+    type Stimulus = AnyStimulus;
 
     fn name(&self) -> String {
         self.0.name()
@@ -169,6 +136,12 @@ impl<T: Twin> Methods for Kind<T> {
 
     fn excited(&self, like: &Recording<AnyStimulus>, time: Vec<f64>, commands: Vec<f64>) -> Option<Recording<AnyStimulus>> {
         self.0.excited(self.own(like), time, commands).map(any_recording)
+    }
+}
+
+impl<T: Twin> Methods for Kind<T> {
+    fn any(&self) -> &dyn Any {
+        &self.0
     }
 
     fn candidates(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
