@@ -11,6 +11,7 @@ mod check;
 mod check_lanes;
 mod controller;
 pub mod diagnose;
+mod elementary;
 mod follow;
 pub mod identify;
 mod lane;

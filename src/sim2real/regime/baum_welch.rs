@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::emission::Densities;
+use super::densities::Densities;
 use super::moments::Moments;
 use super::observations::is_lost;
 use super::starts;
-use super::trellis::{Trellis, Visit};
+use super::trellis::{Seen, Trellis, Visit};
 use super::{Degrees, Emission, Family, HiddenMarkov, Observations, RegimeError, Settings, Spread};
 
 /// Rows of which starts are tried: of a longer series a sample of stretches, and the best start goes on over all of it.
@@ -260,24 +260,23 @@ struct Counting<'a> {
     expected: &'a mut Expected,
     part: Observations<'a>,
     densities: &'a Densities,
-    beliefs: &'a [f64],
 }
 
 impl Visit for Counting<'_> {
     #[inline(always)]
-    fn visit(&mut self, number: usize, posterior: &[f64], ahead: &[f64]) {
-        let states = posterior.len();
-        let row = self.part.row(number);
+    fn visit(&mut self, seen: Seen) {
+        let row = self.part.row(seen.row);
         if !is_lost(row) {
-            self.expected.moments.add(row, posterior, Some(self.densities));
+            self.expected.moments.add(row, seen.posterior, Some(self.densities));
         }
-        if number == 0 {
-            self.expected.initial.iter_mut().zip(posterior).for_each(|(sum, p)| *sum += p);
+        let states = seen.posterior.len();
+        let Some(before) = seen.before else {
+            self.expected.initial.iter_mut().zip(seen.posterior).for_each(|(sum, p)| *sum += p);
             return;
-        }
-        let belief = &self.beliefs[(number - 1) * states..][..states];
-        for (sums, from) in self.expected.transition.chunks_exact_mut(states).zip(belief) {
-            for (sum, to) in sums.iter_mut().zip(ahead) {
+        };
+        let transition = &mut self.expected.transition[..states * states];
+        for (sums, from) in transition.chunks_exact_mut(states).zip(before) {
+            for (sum, to) in sums.iter_mut().zip(seen.ahead) {
                 *sum += from * to;
             }
         }
@@ -297,8 +296,7 @@ impl Expected {
         for part in series.iter().filter(|part| !part.is_empty()) {
             trellis.forward(model, *part);
             expected.log_likelihood += trellis.log_likelihood;
-            let (densities, beliefs) = (model.densities(), trellis.beliefs.as_slice());
-            trellis.backward(model, &mut Counting { expected: &mut expected, part: *part, densities, beliefs });
+            trellis.backward(model, &mut Counting { expected: &mut expected, part: *part, densities: model.densities() });
         }
         expected
     }

@@ -1,15 +1,17 @@
 //! Which states a whole series was in: the probability of each in each row, and the likeliest path.
 
-use super::trellis::{Trellis, Visit, follow};
+use super::course::PerState;
+use super::densities::{Block, Evaluated, each_block};
+use super::trellis::{Seen, Trellis, Visit, follow};
 use super::{HiddenMarkov, Observations, RegimeError};
 
-/// Probabilities as they are shown, `[row][state]`.
-struct Smoothed(Vec<f64>);
+/// Writes what is believed given the whole series over what was believed without what follows.
+struct InPlace;
 
-impl Visit for Smoothed {
+impl Visit for InPlace {
     #[inline(always)]
-    fn visit(&mut self, row: usize, posterior: &[f64], _: &[f64]) {
-        self.0[row * posterior.len()..][..posterior.len()].copy_from_slice(posterior);
+    fn visit(&mut self, seen: Seen) {
+        seen.belief.copy_from_slice(seen.posterior);
     }
 }
 
@@ -32,9 +34,8 @@ impl HiddenMarkov {
         self.check(series)?;
         let mut trellis = Trellis::default();
         trellis.forward(self, series);
-        let mut smoothed = Smoothed(vec![0.0; trellis.beliefs.len()]);
-        trellis.backward(self, &mut smoothed);
-        Ok(smoothed.0)
+        trellis.backward(self, &mut InPlace);
+        Ok(trellis.beliefs)
     }
 
     /// The likeliest path of states given the whole series, and the logarithm of its density with the series (A. J. Viterbi,
@@ -44,44 +45,71 @@ impl HiddenMarkov {
     /// A series of another width than the model's.
     pub fn viterbi(&self, series: Observations) -> Result<(Vec<usize>, f64), RegimeError> {
         self.check(series)?;
-        let states = self.states();
-        let logarithms: Vec<f64> = self.transition().iter().map(|p| p.ln()).collect();
-        let mut best: Vec<f64> = self.initial().iter().map(|p| p.ln()).collect();
-        let (mut next, mut density) = (vec![0.0; states], vec![0.0; states]);
-        // Where each state's best path came from, `[row][state]`.
-        let mut origins = vec![0_u32; series.len() * states];
-        for (number, (row, origin)) in series.iter().zip(origins.chunks_exact_mut(states)).enumerate() {
-            self.densities().logarithms(row, &mut density);
-            if number == 0 {
-                for (score, log) in best.iter_mut().zip(&density) {
-                    *score += log;
-                }
-                continue;
-            }
-            for to in 0..states {
-                let (mut from, mut score) = (0, f64::NEG_INFINITY);
-                for (state, before) in best.iter().enumerate() {
-                    let candidate = before + logarithms[state * states + to];
-                    if candidate > score {
-                        (from, score) = (state, candidate);
-                    }
-                }
-                origin[to] = from as u32;
-                next[to] = score + density[to];
-            }
-            std::mem::swap(&mut best, &mut next);
-        }
-        let (mut state, mut score) = (0, f64::NEG_INFINITY);
-        for (candidate, of) in best.iter().enumerate() {
-            if *of > score {
-                (state, score) = (candidate, *of);
-            }
-        }
-        let mut path = vec![state; series.len()];
-        for row in (1..series.len()).rev() {
-            state = origins[row * states + state] as usize;
-            path[row - 1] = state;
-        }
-        Ok((path, score))
+        Ok(match self.states() {
+            2 => likeliest::<[f64; 2]>(self, series),
+            3 => likeliest::<[f64; 3]>(self, series),
+            4 => likeliest::<[f64; 4]>(self, series),
+            _ => likeliest::<Vec<f64>>(self, series),
+        })
     }
+}
+
+/// The recursion of Viterbi.
+fn likeliest<S: PerState>(model: &HiddenMarkov, series: Observations) -> (Vec<usize>, f64) {
+    let states = model.states();
+    let transition: Vec<f64> = model.transition().iter().map(|p| p.ln()).collect();
+    let mut scores = Scores { best: S::of(model.initial()), next: S::of(model.initial()) };
+    scores.next.as_mut().iter_mut().for_each(|probability| *probability = probability.ln());
+    // Where the best path to each state of the next row comes from, `[row][state]`.
+    let mut origins = vec![0_u32; series.len() * states];
+    each_block(model, Evaluated::Logarithms, series, |block| {
+        choose(block, &transition, &mut scores, &mut origins[block.from * states..]);
+    });
+    let (mut state, mut score) = (0, f64::NEG_INFINITY);
+    for (candidate, of) in scores.best.as_ref().iter().enumerate() {
+        if *of > score {
+            (state, score) = (candidate, *of);
+        }
+    }
+    let mut path = vec![state; series.len()];
+    for (place, origin) in path.iter_mut().zip(origins.chunks_exact(states)).rev().skip(1) {
+        state = origin[state] as usize;
+        *place = state;
+    }
+    (path, score)
+}
+
+/// Logarithms of the density of the rows so far along the best path to each state of the last row, and to each of the next.
+#[derive(Clone)]
+struct Scores<S> {
+    best: S,
+    next: S,
+}
+
+/// Goes on over a block, and writes where paths come from. A function of its own, so that scores stay in registers.
+#[inline(never)]
+fn choose<S: PerState>(block: &Block, transition: &[f64], scores: &mut Scores<S>, origins: &mut [u32]) {
+    let Scores { mut best, mut next } = scores.clone();
+    let states = best.as_ref().len();
+    let transition = &transition[..states * states];
+    let mut rows = origins.chunks_exact_mut(states);
+    block.each_row::<S>(|_, density| {
+        let Some(origin) = rows.next() else { return };
+        let (best, next) = (best.as_mut(), next.as_mut());
+        for ((best, before), density) in best.iter_mut().zip(&*next).zip(density.as_ref()) {
+            *best = before + density;
+        }
+        for to in 0..states {
+            let (mut from, mut score) = (0, best[0] + transition[to]);
+            for state in 1..states {
+                let candidate = best[state] + transition[state * states + to];
+                // Two choices, and no branch.
+                from = if candidate > score { state as u32 } else { from };
+                score = if candidate > score { candidate } else { score };
+            }
+            origin[to] = from;
+            next[to] = score;
+        }
+    });
+    *scores = Scores { best, next };
 }

@@ -1,6 +1,7 @@
 //! The probability of each state given what is known by now, one observation at a time.
 
-use super::trellis::{LogProduct, absorb, follow, predict};
+use super::course::Course;
+use super::trellis::follow;
 use super::{HiddenMarkov, Observations, RegimeError};
 
 /// A model that follows a series as it comes. After each row it holds the probability of each state given all rows up to
@@ -10,10 +11,9 @@ use super::{HiddenMarkov, Observations, RegimeError};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
     model: HiddenMarkov,
+    course: Course<Vec<f64>>,
     belief: Vec<f64>,
-    predicted: Vec<f64>,
     weights: Vec<f64>,
-    likelihood: LogProduct,
     rows: u64,
 }
 
@@ -21,9 +21,8 @@ impl Filter {
     /// Before the first row.
     #[must_use]
     pub fn new(model: HiddenMarkov) -> Self {
-        let predicted = model.initial().to_vec();
-        let nothing = vec![0.0; predicted.len()];
-        Self { belief: predicted.clone(), predicted, weights: nothing, likelihood: LogProduct::ONE, rows: 0, model }
+        let (belief, weights) = (model.initial().to_vec(), vec![0.0; model.states()]);
+        Self { course: Course::new(&model), belief, weights, rows: 0, model }
     }
 
     /// Takes the next row, and gives the probability of each state.
@@ -35,12 +34,10 @@ impl Filter {
         if row.len() != self.model.width() || row.iter().any(|x| x.is_infinite()) {
             return Err(self.refused(row));
         }
-        if self.rows > 0 {
-            predict(self.model.transition(), &self.belief, &mut self.predicted);
-        }
         self.rows += 1;
-        let evidence = absorb(self.model.densities(), row, &self.predicted, &mut self.weights, &mut self.belief);
-        self.likelihood.multiply(evidence);
+        self.model.densities().weights(row, &mut self.weights);
+        self.course.step(&self.model, row, &mut self.weights);
+        self.course.believe(&mut self.belief);
         Ok(&self.belief)
     }
 
@@ -63,7 +60,7 @@ impl Filter {
     /// Logarithm of the density of all rows so far.
     #[must_use]
     pub fn log_likelihood(&self) -> f64 {
-        self.likelihood.logarithm()
+        self.course.log_likelihood(&self.model)
     }
 
     /// Number of rows so far.

@@ -3,8 +3,8 @@
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use super::emission::{Densities, Emission};
-use super::{Observations, RegimeError};
+use super::densities::Densities;
+use super::{Emission, Observations, RegimeError};
 use crate::sim2real::Seed;
 
 /// States that follow each other as a Markov chain, each with a distribution of what is observed while it lasts.

@@ -11,8 +11,10 @@
 //! What has a `step` is online: what it said of a row, no later row changes by a bit. All else looks at a series from its end.
 
 mod baum_welch;
+mod course;
 mod cusum;
 mod decode;
+mod densities;
 mod drift;
 mod emission;
 mod error;

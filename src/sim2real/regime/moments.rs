@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 use statrs::function::gamma::digamma;
 
-use super::emission::Densities;
+use super::densities::Densities;
 use super::{Degrees, Emission, Family, Spread};
 
 /// Bounds of degrees of freedom that are fitted: above 2, so that there is a variance; from 200 on it is a Gaussian.

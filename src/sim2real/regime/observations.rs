@@ -67,6 +67,11 @@ impl<'a> Observations<'a> {
         self.values.chunks_exact(self.width)
     }
 
+    /// All values, row after row.
+    pub(super) fn values(&self) -> &'a [f64] {
+        self.values
+    }
+
     /// Rows `from` to `to`, the latter not among them, as far as there are rows.
     #[must_use]
     pub fn slice(&self, from: usize, to: usize) -> Self {

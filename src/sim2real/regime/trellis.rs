@@ -1,144 +1,63 @@
-//! The recursions forward and backward over a series, scaled so that no product of densities under- or overflows.
+//! The recursions over a whole series: forward, and backward over what was found forward.
 
-use super::emission::Densities;
-use super::observations::is_lost;
+use super::course::{Course, LARGEST, PerState};
+use super::densities::{Block, Evaluated, each_block};
 use super::{HiddenMarkov, Observations};
-
-/// Below this the evidence of a row is added up in logarithms: almost only states that cannot be would explain it.
-const FAINT: f64 = 1e-280;
-
-/// Bound of what is multiplied, so that no product is infinite.
-const LARGEST: f64 = 1e300;
-
-/// Probabilities of the next state, `next[j] = sum of belief[i] transition[i][j]`.
-#[inline(always)]
-pub(super) fn predict(transition: &[f64], belief: &[f64], next: &mut [f64]) {
-    match next.len() {
-        2 => predict_of(2, transition, belief, next),
-        3 => predict_of(3, transition, belief, next),
-        4 => predict_of(4, transition, belief, next),
-        states => predict_of(states, transition, belief, next),
-    }
-}
-
-#[inline(always)]
-fn predict_of(states: usize, transition: &[f64], belief: &[f64], next: &mut [f64]) {
-    let (belief, next) = (&belief[..states], &mut next[..states]);
-    next.fill(0.0);
-    for (from, row) in belief.iter().zip(transition.chunks_exact(states)) {
-        for (to, probability) in next.iter_mut().zip(row) {
-            *to += from * probability;
-        }
-    }
-}
-
-/// What a row says: its probability density given all before, as `exp(peak) / inverse`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Evidence {
-    peak: f64,
-    scale: f64,
-    inverse: f64,
-}
-
-/// Turns what was predicted into what is believed once `row` is known. `weights` is left at the density of each state over
-/// `exp(peak)`; of a state that cannot be it may be left at 0.
-#[inline(always)]
-pub(super) fn absorb(
-    densities: &Densities,
-    row: &[f64],
-    predicted: &[f64],
-    weights: &mut [f64],
-    belief: &mut [f64],
-) -> Evidence {
-    densities.weights(row, weights);
-    let mut scale = 0.0;
-    for ((weight, before), after) in weights.iter().zip(predicted).zip(belief.iter_mut()) {
-        *after = *weight * before;
-        scale += *after;
-    }
-    if scale < FAINT {
-        return absorb_faint(densities, row, predicted, weights, belief);
-    }
-    let inverse = 1.0 / scale;
-    for after in belief.iter_mut() {
-        *after *= inverse;
-    }
-    let peak = if is_lost(row) { 0.0 } else { densities.highest };
-    Evidence { peak, scale, inverse }
-}
-
-/// The same in logarithms, over the states that can be.
-#[cold]
-#[inline(never)]
-fn absorb_faint(densities: &Densities, row: &[f64], predicted: &[f64], weights: &mut [f64], belief: &mut [f64]) -> Evidence {
-    densities.logarithms(row, belief);
-    let mut peak = f64::NEG_INFINITY;
-    for (log, before) in belief.iter_mut().zip(predicted) {
-        *log += before.ln();
-        peak = peak.max(*log);
-    }
-    let mut sum = 0.0;
-    for log in belief.iter_mut() {
-        *log = (*log - peak).exp();
-        sum += *log;
-    }
-    for ((after, weight), before) in belief.iter_mut().zip(weights).zip(predicted) {
-        *after /= sum;
-        *weight = if *before > 0.0 { (*after / before).min(LARGEST) } else { 0.0 };
-    }
-    Evidence { peak: peak + sum.ln(), scale: 1.0, inverse: 1.0 }
-}
-
-/// The logarithm of a product of evidence, which takes one logarithm for many factors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LogProduct {
-    sum: f64,
-    product: f64,
-}
-
-impl LogProduct {
-    /// Of nothing.
-    pub const ONE: Self = Self { sum: 0.0, product: 1.0 };
-
-    #[inline(always)]
-    pub fn multiply(&mut self, evidence: Evidence) {
-        self.sum += evidence.peak;
-        let product = self.product * evidence.scale;
-        // A scale is at least `FAINT` and, but for rounding, at most 1.
-        if product < 1e-300 {
-            self.sum += self.product.ln() + evidence.scale.ln();
-            self.product = 1.0;
-        } else {
-            self.product = product;
-        }
-    }
-
-    pub fn logarithm(self) -> f64 {
-        self.sum + self.product.ln()
-    }
-}
-
-/// Who is shown the rows by [`Trellis::backward`], the last first.
-pub(super) trait Visit {
-    /// The number of a row, the probability of each state given the whole series, and for each state how much more likely its row
-    /// and all that follow are than they were given all before: the expected number of transitions into this row is
-    /// `belief[i] transition[i][j] ahead[j]`.
-    fn visit(&mut self, row: usize, posterior: &[f64], ahead: &[f64]);
-}
 
 /// Runs forward over a series, shows each row's belief, and gives the log-likelihood: bit by bit what [`Trellis::forward`] finds,
 /// without its memory.
-pub(super) fn follow(model: &HiddenMarkov, series: Observations, mut see: impl FnMut(&[f64])) -> f64 {
-    let states = model.states();
-    let mut predicted = model.initial().to_vec();
-    let (mut weights, mut belief) = (vec![0.0; states], vec![0.0; states]);
-    let mut total = LogProduct::ONE;
-    for row in series.iter() {
-        total.multiply(absorb(model.densities(), row, &predicted, &mut weights, &mut belief));
-        see(&belief);
-        predict(model.transition(), &belief, &mut predicted);
+pub(super) fn follow(model: &HiddenMarkov, series: Observations, see: impl FnMut(&[f64])) -> f64 {
+    match model.states() {
+        2 => follow_of::<[f64; 2]>(model, series, see),
+        3 => follow_of::<[f64; 3]>(model, series, see),
+        4 => follow_of::<[f64; 4]>(model, series, see),
+        _ => follow_of::<Vec<f64>>(model, series, see),
     }
-    total.logarithm()
+}
+
+#[inline(always)]
+fn follow_of<S: PerState>(model: &HiddenMarkov, series: Observations, mut see: impl FnMut(&[f64])) -> f64 {
+    let mut course = Course::<S>::new(model);
+    let mut belief = S::of(model.initial());
+    each_block(model, Evaluated::Weights, series, |block| {
+        advance(block, &mut course, |course, _, _| {
+            course.believe(belief.as_mut());
+            see(belief.as_ref());
+        });
+    });
+    course.log_likelihood(model)
+}
+
+/// Goes on over a block; `see` is shown where it is after each row, its weights, and what makes ratios of them. A function of its own, so that
+/// where it is stays in registers.
+#[inline(never)]
+fn advance<S: PerState>(block: &Block, from: &mut Course<S>, mut see: impl FnMut(&Course<S>, &S, f64)) {
+    let mut course = from.clone();
+    block.each_row::<S>(|row, weights| {
+        let inverse = course.step(block.model, row, weights);
+        see(&course, weights, inverse);
+    });
+    *from = course;
+}
+
+/// What is known of a row where the recursion backward comes by.
+pub(super) struct Seen<'a> {
+    pub row: usize,
+    /// What was believed of the row before it; nothing of the first.
+    pub before: Option<&'a [f64]>,
+    /// What was believed of it given the rows up to it. It is read no more.
+    pub belief: &'a mut [f64],
+    /// Probability of each state given the whole series.
+    pub posterior: &'a [f64],
+    /// For each state how much more likely the row and all that follow are than they were given all before: the expected number of
+    /// transitions into this row is `before[i] transition[i][j] ahead[j]`.
+    pub ahead: &'a [f64],
+}
+
+/// Who is shown the rows by [`Trellis::backward`]: a trait, because its method can be told to be inlined.
+pub(super) trait Visit {
+    /// Takes what is known of a row.
+    fn visit(&mut self, seen: Seen);
 }
 
 /// What the recursion forward found, row after row.
@@ -160,45 +79,52 @@ impl Trellis {
         self.beliefs.resize(size, 0.0);
         self.ratios.resize(size, 0.0);
         match self.states {
-            2 => self.forward_of(2, model, series),
-            3 => self.forward_of(3, model, series),
-            4 => self.forward_of(4, model, series),
-            states => self.forward_of(states, model, series),
+            2 => self.forward_of::<[f64; 2]>(2, model, series),
+            3 => self.forward_of::<[f64; 3]>(3, model, series),
+            4 => self.forward_of::<[f64; 4]>(4, model, series),
+            states => self.forward_of::<Vec<f64>>(states, model, series),
         }
     }
 
     #[inline(always)]
-    fn forward_of(&mut self, states: usize, model: &HiddenMarkov, series: Observations) {
-        let mut predicted = model.initial().to_vec();
-        let mut total = LogProduct::ONE;
-        let rows = self.beliefs.chunks_exact_mut(states).zip(self.ratios.chunks_exact_mut(states));
-        for (row, (belief, ratio)) in series.iter().zip(rows) {
-            let evidence = absorb(model.densities(), row, &predicted, ratio, belief);
-            for weight in ratio.iter_mut() {
-                *weight *= evidence.inverse;
-            }
-            total.multiply(evidence);
-            predict_of(states, model.transition(), belief, &mut predicted);
-        }
-        self.log_likelihood = total.logarithm();
+    fn forward_of<S: PerState>(&mut self, states: usize, model: &HiddenMarkov, series: Observations) {
+        let mut course = Course::<S>::new(model);
+        let mut rows = self.beliefs.chunks_exact_mut(states).zip(self.ratios.chunks_exact_mut(states));
+        each_block(model, Evaluated::Weights, series, |block| {
+            advance(block, &mut course, |course, weights, inverse| {
+                let Some((belief, ratios)) = rows.next() else { return };
+                for (ratio, weight) in ratios.iter_mut().zip(weights.as_ref()) {
+                    *ratio = weight * inverse;
+                }
+                course.believe(belief);
+            });
+        });
+        self.log_likelihood = course.log_likelihood(model);
     }
 
-    /// Runs backward over what the recursion forward found.
-    pub fn backward(&self, model: &HiddenMarkov, visitor: &mut impl Visit) {
+    /// Runs backward over what the recursion forward found, and shows `visitor` each row, the last first.
+    #[inline(always)]
+    pub fn backward(&mut self, model: &HiddenMarkov, visitor: &mut impl Visit) {
         match self.states {
-            2 => self.backward_of(2, model, visitor),
-            3 => self.backward_of(3, model, visitor),
-            4 => self.backward_of(4, model, visitor),
-            states => self.backward_of(states, model, visitor),
+            2 => self.backward_of::<[f64; 2]>(model, visitor),
+            3 => self.backward_of::<[f64; 3]>(model, visitor),
+            4 => self.backward_of::<[f64; 4]>(model, visitor),
+            _ => self.backward_of::<Vec<f64>>(model, visitor),
         }
     }
 
     #[inline(always)]
-    fn backward_of(&self, states: usize, model: &HiddenMarkov, visitor: &mut impl Visit) {
-        let (mut beta, mut posterior, mut ahead) = (vec![1.0; states], vec![0.0; states], vec![0.0; states]);
-        let (beta, posterior, ahead) = (&mut beta[..states], &mut posterior[..states], &mut ahead[..states]);
-        let rows = self.beliefs.chunks_exact(states).zip(self.ratios.chunks_exact(states));
-        for (row, (belief, ratio)) in rows.enumerate().rev() {
+    fn backward_of<S: PerState>(&mut self, model: &HiddenMarkov, visitor: &mut impl Visit) {
+        let (mut beta, mut posterior, mut ahead) = (S::of(model.initial()), S::of(model.initial()), S::of(model.initial()));
+        let (beta, posterior, ahead) = (beta.as_mut(), posterior.as_mut(), ahead.as_mut());
+        let states = beta.len();
+        let transition = &model.transition()[..states * states];
+        beta.fill(1.0);
+        let (beliefs, ratios) = (self.beliefs.as_mut_slice(), self.ratios.as_slice());
+        for (row, ratio) in ratios.chunks_exact(states).enumerate().rev() {
+            let (before, rest) = beliefs.split_at_mut(row * states);
+            let before = row.checked_sub(1).map(|row| &before[row * states..][..states]);
+            let belief = &mut rest[..states];
             let mut sum = 0.0;
             for state in 0..states {
                 posterior[state] = belief[state] * beta[state];
@@ -209,13 +135,13 @@ impl Trellis {
             for probability in posterior.iter_mut() {
                 *probability *= inverse;
             }
-            visitor.visit(row, posterior, ahead);
-            for (before, transitions) in beta.iter_mut().zip(model.transition().chunks_exact(states)) {
-                let mut product = 0.0;
-                for (probability, after) in transitions.iter().zip(ahead.iter()) {
-                    product += probability * after;
+            visitor.visit(Seen { row, before, belief, posterior, ahead });
+            for from in 0..states {
+                let mut product = transition[from * states] * ahead[0];
+                for to in 1..states {
+                    product += transition[from * states + to] * ahead[to];
                 }
-                *before = product.min(LARGEST);
+                beta[from] = if product < LARGEST { product } else { LARGEST };
             }
         }
     }

@@ -3,9 +3,9 @@
 use super::colour::ColourMap;
 use super::draw::Uniform;
 use super::effect::{Effect, EffectParameter};
-use super::elementary::exp2;
 use super::error::ImageError;
 use super::settings::Setting;
+use crate::sim2real::elementary::exp2;
 
 /// The exponent by which a camera encodes light: `x = light^(1 / 2.2)`. The curve of IEC 61966-2-1 (sRGB), without its straight
 /// piece in the dark.

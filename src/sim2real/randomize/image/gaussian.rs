@@ -2,8 +2,8 @@
 
 use std::sync::LazyLock;
 
-use super::elementary::exp_minus;
 use super::pixel::{Pixel, pixel};
+use crate::sim2real::elementary::exp;
 use crate::sim2real::split_mix::scattered;
 
 /// 64 bits for each number under a key.
@@ -58,7 +58,7 @@ static TABLE: LazyLock<Box<[f32; QUANTILES]>> = LazyLock::new(|| {
 });
 
 fn density(x: f64) -> f64 {
-    exp_minus(0.5 * x * x) / (2.0 * std::f64::consts::PI).sqrt()
+    exp(-0.5 * x * x) / (2.0 * std::f64::consts::PI).sqrt()
 }
 
 /// The probability of a normal draw below `x`, by the series `1/2 + density (x + x^3 / 3 + x^5 / (3 5) + ...)`; Abramowitz &

@@ -3,9 +3,9 @@
 use super::colour::ColourMap;
 use super::draw::Uniform;
 use super::effect::{Effect, EffectParameter};
-use super::elementary::sin_cos;
 use super::error::ImageError;
 use super::settings::Setting;
+use crate::sim2real::elementary::sin_cos;
 
 /// A turn by `hue` and a gain `saturation` of the chrominance `(I, Q)`, in which the luminance `Y` is kept. Grey images
 /// have no colour, and are left alone.

@@ -54,7 +54,6 @@ mod colour;
 mod contrast;
 mod draw;
 mod effect;
-mod elementary;
 mod error;
 mod exposure;
 mod gaussian;

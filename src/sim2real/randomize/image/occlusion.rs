@@ -2,12 +2,12 @@
 
 use super::draw::Uniform;
 use super::effect::{Effect, EffectParameter};
-use super::elementary::exp2;
 use super::error::ImageError;
 use super::gaussian::Counter;
 use super::pixel::Pixel;
 use super::settings::Setting;
 use super::view::{Shape, Value};
+use crate::sim2real::elementary::exp2;
 
 /// Up to four rectangles of the image are filled, the last effect of all, so that the fill is what it says. Alpha stays
 /// what it is.

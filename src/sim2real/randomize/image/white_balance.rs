@@ -3,10 +3,10 @@
 use super::colour::ColourMap;
 use super::draw::Uniform;
 use super::effect::{Effect, EffectParameter};
-use super::elementary::exp2;
 use super::error::ImageError;
 use super::exposure::GAMMA;
 use super::settings::Setting;
+use crate::sim2real::elementary::exp2;
 
 /// `r -> r 2^(red / 2.2)`, `b -> b 2^(blue / 2.2)`: red and blue light are multiplied by `2^red` and `2^blue`, green is
 /// not. Grey images have no colour, and are left alone.

@@ -1,0 +1,161 @@
+//! Elementary functions of sums, products and quotients alone: they give the same bits on every machine, where those of the
+//! platform's own library differ in the last place, and compilers turn them into vector instructions over many numbers, where a
+//! library's is called number by number.
+
+use std::f64::consts::{FRAC_PI_2, LN_2, LOG2_E, SQRT_2};
+
+/// Adding this to a number of less than 2^51 rounds it to a whole one, whose lowest bits are then the lowest of the sum.
+const ROUNDING: f64 = 6_755_399_441_055_744.0;
+
+const ONE: u64 = 1.0_f64.to_bits();
+
+/// The logarithm of 2 in two parts, the first short enough for exact products with a whole number of up to 11 bits (Cody & Waite,
+/// *Software Manual for the Elementary Functions* (1980), chapter 6).
+const LN_2_PARTS: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
+
+/// Below this an exponential is taken as 0: there it would have fewer digits than elsewhere.
+const LEAST: f64 = -708.0;
+
+/// Taylor's coefficients of the exponential, `1 / k!` from `k = 2` on: what is left out is below 1e-17 within half of `LN_2`.
+const FACTORS: [f64; 12] = [
+    1.0 / 2.0,
+    1.0 / 6.0,
+    1.0 / 24.0,
+    1.0 / 120.0,
+    1.0 / 720.0,
+    1.0 / 5_040.0,
+    1.0 / 40_320.0,
+    1.0 / 362_880.0,
+    1.0 / 3_628_800.0,
+    1.0 / 39_916_800.0,
+    1.0 / 479_001_600.0,
+    1.0 / 6_227_020_800.0,
+];
+
+/// `e^x` for `x` up to 708, to within two units in the last place; 0 below -708.
+#[inline(always)]
+pub(crate) fn exp(x: f64) -> f64 {
+    let shifted = x * LOG2_E + ROUNDING;
+    let whole = shifted - ROUNDING;
+    let rest = (x - whole * LN_2_PARTS[0]) - whole * LN_2_PARTS[1];
+    // In pairs, so that few operations wait for one another (Estrin 1960).
+    let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11] = FACTORS;
+    let (r2, r4) = (rest * rest, (rest * rest) * (rest * rest));
+    let low = (c0 + c1 * rest) + (c2 + c3 * rest) * r2;
+    let middle = (c4 + c5 * rest) + (c6 + c7 * rest) * r2;
+    let high = (c8 + c9 * rest) + (c10 + c11 * rest) * r2;
+    let small = 1.0 + (rest + r2 * (low + (middle + high * r4) * r4));
+    // The whole number is added to the exponent of 1.
+    let power = f64::from_bits(ONE.wrapping_add(shifted.to_bits() << 52));
+    // A choice by bits, which a compiler does not take for a branch.
+    let kept = u64::from(x >= LEAST || x.is_nan()).wrapping_neg();
+    f64::from_bits((small * power).to_bits() & kept)
+}
+
+/// Coefficients of `2 artanh(s) / s` in `s^2`, `2 / (2 k + 1)` from `k = 1` on: what is left out is below 1e-17 of it where `s` is that
+/// of a number between the square roots of a half and of 2.
+const ODD: [f64; 11] = [
+    2.0 / 3.0,
+    2.0 / 5.0,
+    2.0 / 7.0,
+    2.0 / 9.0,
+    2.0 / 11.0,
+    2.0 / 13.0,
+    2.0 / 15.0,
+    2.0 / 17.0,
+    2.0 / 19.0,
+    2.0 / 21.0,
+    2.0 / 23.0,
+];
+
+/// `ln(1 + x)` for finite `x` from 0 on, to within a few units in the last place.
+#[inline(always)]
+pub(crate) fn ln_1p(x: f64) -> f64 {
+    let sum = 1.0 + x;
+    // What was lost when 1 was added, over the sum: the logarithm grows by it.
+    let lost = (x - (sum - 1.0)) / sum;
+    // A mantissa from sqrt(1/2) to sqrt(2), and the exponent that goes with it.
+    let shifted = sum.to_bits().wrapping_sub((0.5 * SQRT_2).to_bits());
+    let exponent = shifted >> 52;
+    let mantissa = f64::from_bits(sum.to_bits().wrapping_sub(exponent << 52));
+    let whole = f64::from_bits(ROUNDING.to_bits() | exponent) - ROUNDING;
+    let s = (mantissa - 1.0) / (mantissa + 1.0);
+    let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10] = ODD;
+    let (z, z2) = (s * s, (s * s) * (s * s));
+    let z4 = z2 * z2;
+    let low = (c0 + c1 * z) + (c2 + c3 * z) * z2;
+    let middle = (c4 + c5 * z) + (c6 + c7 * z) * z2;
+    let high = (c8 + c9 * z) + c10 * z2;
+    let artanh = s * z * (low + (middle + high * z4) * z4);
+    whole * LN_2_PARTS[0] + (2.0 * s + (artanh + (whole * LN_2_PARTS[1] + lost)))
+}
+
+/// `2^x` for `|x|` up to 1,000, to some 1e-15 of its value.
+pub(crate) fn exp2(x: f64) -> f64 {
+    let whole = (x + 0.5).floor();
+    // A number of 1,000 at most, and a power of two that is put together from its exponent.
+    let power = f64::from_bits(((whole as i64 + 1_023) as u64) << 52);
+    power * exp((x - whole) * LN_2)
+}
+
+/// Sine and cosine of an angle of some turns at most [rad], to some 1e-15.
+pub(crate) fn sin_cos(angle: f64) -> (f64, f64) {
+    let quarter = (angle / FRAC_PI_2 + 0.5).floor();
+    let x = angle - quarter * FRAC_PI_2;
+    let square = x * x;
+    // Taylor's series; at 45 degrees and less their last terms are below 1e-17.
+    let sine = x * (1..9).rev().fold(1.0, |sum, n| 1.0 - sum * square / f64::from(2 * n * (2 * n + 1)));
+    let cosine = (1..9).rev().fold(1.0, |sum, n| 1.0 - sum * square / f64::from(2 * n * (2 * n - 1)));
+    match (quarter as i64).rem_euclid(4) {
+        0 => (sine, cosine),
+        1 => (cosine, -sine),
+        2 => (-sine, -cosine),
+        _ => (-cosine, sine),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn they_agree_with_the_library() {
+        for step in -4_000..4_000 {
+            let x = f64::from(step) / 400.0;
+            assert!((exp2(x) / x.exp2() - 1.0).abs() < 4e-15, "2^{x}");
+            let (sine, cosine) = sin_cos(x);
+            assert!((sine - x.sin()).abs() < 3e-15 && (cosine - x.cos()).abs() < 3e-15, "{x} rad");
+        }
+        assert_eq!(exp2(0.0), 1.0);
+        assert_eq!(exp2(3.0), 8.0);
+        assert_eq!(sin_cos(0.0), (0.0, 1.0));
+    }
+
+    /// Over all their range, the ends among it, and beside the places where one power of two gives way to the next.
+    #[test]
+    fn exponentials_and_logarithms_are_right_to_the_last_digits() {
+        let close =
+            |found: f64, right: f64, least: f64| (found - right).abs() <= 3.0 * f64::EPSILON * right.abs().max(least);
+        for step in 0..=200_000 {
+            for x in
+                [-708.0 + 1_416.0 * f64::from(step) / 200_000.0, -f64::from(step) * 1e-6, f64::from(step - 700) * LN_2 * 0.5]
+            {
+                if (-708.0..=708.0).contains(&x) {
+                    assert!(close(exp(x), x.exp(), 0.0), "e^{x}: {} and {}", exp(x), x.exp());
+                }
+            }
+            for x in [
+                f64::from(step) * 1e-5,
+                f64::from(step).exp2(),
+                10.0_f64.powf(-f64::from(step) / 1e3),
+                f64::from(step) * 1e290,
+            ] {
+                if x.is_finite() {
+                    assert!(close(ln_1p(x), x.ln_1p(), 0.0), "ln(1 + {x}): {} and {}", ln_1p(x), x.ln_1p());
+                }
+            }
+        }
+        assert_eq!([exp(0.0), exp(-708.1), exp(-5e299), exp(f64::NEG_INFINITY), ln_1p(0.0)], [1.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!(exp(f64::NAN).is_nan());
+    }
+}
