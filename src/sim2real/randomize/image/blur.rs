@@ -1,9 +1,11 @@
 //! Blur: optics out of focus.
 
+use bytemuck::{cast_slice, cast_slice_mut};
+
 use super::draw::Uniform;
 use super::effect::{Effect, EffectParameter};
 use super::error::ImageError;
-use super::pixel::{Pixel, pixel};
+use super::pixel::Pixel;
 use super::scene::Scene;
 use super::settings::Setting;
 
@@ -46,39 +48,59 @@ impl Setting for Blur {
 }
 
 impl Blur {
-    /// Blurs what is within the scene's margin; `line` is room for a row with its margin.
-    pub(super) fn apply(self, scene: &mut Scene, line: &mut [Pixel]) {
+    /// Blurs what is within the scene's margin; `lines` is room for three rows.
+    #[inline(always)]
+    pub(super) fn apply<const C: usize>(self, scene: &mut Scene, lines: &mut [Vec<Pixel>; 3]) {
         let weight = 0.5 * f64::from(self.std) * f64::from(self.std);
         let passes = (weight / LARGEST).ceil();
         let beside = (weight / passes) as f32;
-        let own = pixel([1.0 - 2.0 * beside, 1.0 - 2.0 * beside, 1.0 - 2.0 * beside, 1.0]);
-        let beside = pixel([beside, beside, beside, 0.0]);
+        lines.iter_mut().for_each(|line| line.resize(scene.stride(), Pixel::ZERO));
         for _ in 0..passes as usize {
-            scene.repeat_edges();
-            scene.rows_mut().for_each(|row| along(row, own, beside));
-            scene.repeat_edges();
-            across(scene, line, own, beside);
+            pass::<C>(scene, lines, beside);
         }
     }
 }
 
-fn along(row: &mut [Pixel], own: Pixel, beside: Pixel) {
-    let mut left = row[0];
-    for at in 1..row.len() - 1 {
-        let itself = row[at];
-        row[at] = own * itself + beside * (left + row[at + 1]);
-        left = itself;
+/// Along each row, and across it as soon as the next one is ready: an image is too large for the nearest memory, rows are not.
+#[inline(always)]
+fn pass<const C: usize>(scene: &mut Scene, [above, line, below]: &mut [Vec<Pixel>; 3], beside: f32) {
+    along::<C>(scene.row_and_margin(1), line, beside);
+    // Above the first row it is as in it, and below the last.
+    above.copy_from_slice(line);
+    for y in 1..=scene.height() {
+        if y < scene.height() {
+            along::<C>(scene.row_and_margin(y + 1), below, beside);
+        } else {
+            below.copy_from_slice(line);
+        }
+        mix::<C>(scene.row_and_margin(y), [above, line, below], beside);
+        std::mem::swap(above, line);
+        std::mem::swap(line, below);
     }
 }
 
-fn across(scene: &mut Scene, above: &mut [Pixel], own: Pixel, beside: Pixel) {
-    above.copy_from_slice(scene.row_and_next(0).0);
-    for y in 1..=scene.height() {
-        let (row, next) = scene.row_and_next(y);
-        for ((pixel, above), below) in row.iter_mut().zip(above.iter_mut()).zip(next) {
-            let before = *pixel;
-            *pixel = own * before + beside * (*above + *below);
-            *above = before;
+/// Blurs a row, beyond whose ends it is as at them.
+#[inline(always)]
+fn along<const C: usize>(row: &mut [Pixel], into: &mut [Pixel], beside: f32) {
+    let last = row.len() - 1;
+    (row[0], row[last]) = (row[1], row[last - 1]);
+    mix::<C>(&mut into[1..last], [&row[..last - 1], &row[1..last], &row[2..]], beside);
+}
+
+/// Spreads the second row by the weight `beside` over the first and the third. It is done number by number: of such a loop compilers make
+/// the widest vectors, of one over pixels they do not.
+#[inline(always)]
+fn mix<const C: usize>(into: &mut [Pixel], rows: [&[Pixel]; 3], beside: f32) {
+    let own = 1.0 - 2.0 * beside;
+    let into: &mut [f32] = cast_slice_mut(into);
+    let [before, row, after] = rows.map(|row| cast_slice::<Pixel, f32>(row));
+    for (((into, before), itself), after) in into.iter_mut().zip(before).zip(row).zip(after) {
+        *into = own * itself + beside * (before + after);
+    }
+    if C == 4 {
+        // Alpha is not blurred.
+        for (into, row) in into.iter_mut().zip(row).skip(3).step_by(4) {
+            *into = *row;
         }
     }
 }

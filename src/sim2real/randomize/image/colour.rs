@@ -48,10 +48,11 @@ pub(super) struct Colour {
 
 impl Colour {
     /// What becomes of a pixel; its alpha stays what it is.
-    #[inline]
-    pub fn apply(&self, place: Pixel) -> Pixel {
+    #[inline(always)]
+    pub fn apply<const C: usize>(&self, place: Pixel) -> Pixel {
         let [r, g, b, _] = place.to_array();
         let light = self.red * Pixel::splat(r) + self.green * Pixel::splat(g) + (self.blue * Pixel::splat(b) + self.offset);
-        light + pixel([0.0, 0.0, 0.0, 1.0]) * place
+        // Where there is no alpha nothing looks at it.
+        if C == 4 { light + pixel([0.0, 0.0, 0.0, 1.0]) * place } else { light }
     }
 }

@@ -22,7 +22,7 @@ impl Counter {
         Self { start: scattered(key) }
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn bits(self, number: u64) -> u64 {
         const WEYL: u64 = 0xa076_1d64_78bd_642f;
         const MASK: u64 = 0xe703_7ed1_a0b4_28db;
@@ -85,7 +85,7 @@ impl Normal {
     }
 
     /// A draw for each channel of one pixel; none for alpha.
-    #[inline]
+    #[inline(always)]
     pub fn draw(&self, number: u64) -> Pixel {
         const LOW: u64 = QUANTILES as u64 - 1;
         let bits = self.counter.bits(number);

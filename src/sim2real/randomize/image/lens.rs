@@ -87,7 +87,7 @@ impl Lens {
     }
 
     /// How far what is seen at `(x, y)` was from there, all in focal lengths.
-    #[inline]
+    #[inline(always)]
     pub(super) fn displacement(&self, x: f32, y: f32) -> (f32, f32) {
         let square = x * x + y * y;
         // Both tangential terms have 2 (p1 y + p2 x) times the coordinate.

@@ -68,7 +68,7 @@ pub(super) struct Noisy {
 
 impl Noisy {
     /// What becomes of the pixel with the number `counter`; its alpha stays what it is.
-    #[inline]
+    #[inline(always)]
     pub fn apply(&self, pixel: Pixel, counter: u64) -> Pixel {
         pixel + (self.dark + self.of_light * pixel.fast_max(Pixel::ZERO)).sqrt() * self.normal.draw(counter)
     }

@@ -11,13 +11,13 @@ use super::view::Value;
 pub(super) type Pixel = f32x4;
 
 /// A pixel of four numbers.
-#[inline]
+#[inline(always)]
 pub(super) fn pixel(numbers: [f32; 4]) -> Pixel {
     f32x4::from(numbers)
 }
 
 /// The way from `a` to `b` by `part`: `a` itself at 0, and wherever both are the same.
-#[inline]
+#[inline(always)]
 pub(super) fn between(a: Pixel, b: Pixel, part: Pixel) -> Pixel {
     a + part * (b - a)
 }
@@ -26,7 +26,7 @@ pub(super) fn between(a: Pixel, b: Pixel, part: Pixel) -> Pixel {
 const TOGETHER: usize = 4;
 
 /// Reads a row of `C` channels. Numbers beyond the channels may be those of the next pixel: nothing looks at them.
-#[inline]
+#[inline(always)]
 pub(super) fn load<V: Value, const C: usize>(row: &[V], line: &mut [Pixel]) {
     let (blocks, rest) = line.as_chunks_mut::<TOGETHER>();
     let last = blocks.len() * TOGETHER * C;
@@ -45,7 +45,7 @@ pub(super) fn load<V: Value, const C: usize>(row: &[V], line: &mut [Pixel]) {
 }
 
 /// A pixel of no more than its own values.
-#[inline]
+#[inline(always)]
 fn one<V: Value, const C: usize>(values: &[V]) -> Pixel {
     let mut numbers = [0.0; 4];
     numbers.iter_mut().zip(values).take(C).for_each(|(number, value)| *number = value.number());
@@ -53,7 +53,7 @@ fn one<V: Value, const C: usize>(values: &[V]) -> Pixel {
 }
 
 /// Writes a row of `C` channels, cut off and rounded as the values need it.
-#[inline]
+#[inline(always)]
 pub(super) fn store<V: Value, const C: usize>(line: &[Pixel], row: &mut [V]) {
     let (blocks, rest) = line.as_chunks::<TOGETHER>();
     let (values, last) = row.split_at_mut(blocks.len() * TOGETHER * C);

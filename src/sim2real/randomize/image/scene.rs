@@ -14,6 +14,7 @@ pub(super) struct Scene {
 
 impl Scene {
     /// Takes an image of `C` channels; the margin is left as it was.
+    #[inline(always)]
     pub fn take<V: Value, const C: usize>(&mut self, values: &[V], shape: Shape) {
         (self.width, self.height) = (shape.width, shape.height);
         self.pixels.resize((self.width + 2) * (self.height + 2), Pixel::ZERO);
@@ -45,6 +46,7 @@ impl Scene {
     }
 
     /// Row `y` of the image moved by whole pixels, `x` to the right and `down` downwards, the margin again and again beyond it.
+    #[inline(always)]
     pub fn moved_row(&self, y: usize, [x, down]: [i64; 2], line: &mut [Pixel]) {
         let (width, height) = (self.width as i64, self.height as i64);
         let from = (y as i64 - down).clamp(-1, height) + 1;
@@ -57,16 +59,17 @@ impl Scene {
     }
 
     /// The rows of the image from the top, each with its margin at both ends.
+    #[inline(always)]
     pub fn rows_mut(&mut self) -> impl Iterator<Item = &mut [Pixel]> {
         let (stride, height) = (self.stride(), self.height);
         self.pixels.chunks_exact_mut(stride).skip(1).take(height)
     }
 
-    /// Row `y` and the one below it, counted from the margin above the image.
-    pub fn row_and_next(&mut self, y: usize) -> (&mut [Pixel], &[Pixel]) {
+    /// Row `y` with its margin, counted from the margin above the image.
+    #[inline(always)]
+    pub fn row_and_margin(&mut self, y: usize) -> &mut [Pixel] {
         let stride = self.stride();
-        let (row, next) = self.pixels[y * stride..(y + 2) * stride].split_at_mut(stride);
-        (row, next)
+        &mut self.pixels[y * stride..(y + 1) * stride]
     }
 
     /// Makes the margin as the edge beside it.

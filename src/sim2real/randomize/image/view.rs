@@ -78,12 +78,12 @@ pub(super) mod sealed {
     impl Value for u8 {
         const FULL: f32 = 255.0;
 
-        #[inline]
+        #[inline(always)]
         fn number(self) -> f32 {
             f32::from(self)
         }
 
-        #[inline]
+        #[inline(always)]
         fn nearest(pixels: &[Pixel; 4]) -> [[Self; 4]; 4] {
             // Numbers that are too large for a narrower integer become its largest.
             let pair = |a: Pixel, b: Pixel| {
@@ -104,12 +104,12 @@ pub(super) mod sealed {
     impl Value for f32 {
         const FULL: f32 = 1.0;
 
-        #[inline]
+        #[inline(always)]
         fn number(self) -> f32 {
             self
         }
 
-        #[inline]
+        #[inline(always)]
         fn nearest(pixels: &[Pixel; 4]) -> [[Self; 4]; 4] {
             let cut = |pixel: Pixel| pixel.fast_max(Pixel::ZERO).fast_min(Pixel::ONE).to_array();
             [cut(pixels[0]), cut(pixels[1]), cut(pixels[2]), cut(pixels[3])]
