@@ -93,7 +93,7 @@ fn along<const C: usize>(row: &mut [Pixel], into: &mut [Pixel], beside: f32) {
 fn mix<const C: usize>(into: &mut [Pixel], rows: [&[Pixel]; 3], beside: f32) {
     let own = 1.0 - 2.0 * beside;
     let into: &mut [f32] = cast_slice_mut(into);
-    let [before, row, after] = rows.map(|row| cast_slice::<Pixel, f32>(row));
+    let [before, row, after] = rows.map(cast_slice::<Pixel, f32>);
     for (((into, before), itself), after) in into.iter_mut().zip(before).zip(row).zip(after) {
         *into = own * itself + beside * (before + after);
     }
