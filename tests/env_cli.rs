@@ -55,6 +55,9 @@ fn a_bench_tells_the_median_and_the_spread() {
         assert!((measured["steps_per_second"].as_f64().unwrap() * median / 1e9 - 1.0).abs() < 1e-9);
         assert!(measured["steps"].as_u64().unwrap() > 0);
     }
+    let (code, out, err) = run("env bench Trade-v0 --run data/bars/run.toml --set length=0 --rounds 1 --seconds 0.01 --json");
+    assert_eq!((code, err.as_str()), (0, ""));
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["id"], "trueup/Trade-v0");
     let (code, out, _) = run("env bench CartPole-v0 --rounds 1 --seconds 0.01");
     assert!(code == 0 && out.starts_with("trueup/CartPole-v0: ") && out.contains(" ns a step ("), "{out}");
 }
@@ -67,6 +70,9 @@ fn what_cannot_be_benched_is_refused_with_a_hint() {
         ("CartPole-v0 --set nonsense=1", "--set: `trueup/CartPole-v0` has no such option"),
         ("Trade-v0 --set length=long", "--set: the value cannot be read, found \"length=long\"\n  hint: "),
         ("Trade-v0 --set length=-1", "option `length` is -1, and must be a whole number"),
+        ("CartPole-v0 --run data/bars/run.toml", "--run: `trueup/CartPole-v0` is in no market\n  hint: "),
+        ("Trade-v0 --run data/no.toml", "data/no.toml: "),
+        ("Trade-v0 --run data/bars/run.toml --set rows=100", "`trueup/Trade-v0` has no option `rows`"),
         ("CartPole-v0 --seconds 0", "--seconds: a round cannot be this long, found 0"),
         ("CartPole-v0 --seconds NaN", "--seconds: a round cannot be this long, found NaN"),
     ] {

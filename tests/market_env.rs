@@ -2,14 +2,17 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+mod account_scene;
 mod env_scene;
 mod market_scene;
 
+use account_scene::{of, with};
 use env_scene::{Numbers, ROWS, at_random, bits, env, market, played, portfolio, run_for};
+use market_scene::{bars, instrument, venue};
 use trueup::market::env::{
     DataKind, ENVIRONMENTS, Ended, Execute, MakeMarket, MarketEnv, MarketSetup, Pace, Portfolio, Task, Ways,
 };
-use trueup::market::{Backtest, History, Orders, Quotes, Record, Settings, Strategy, View};
+use trueup::market::{Backtest, History, Orders, Quotes, Record, Settings, Strategy, Terms, View};
 use trueup::rl::{Actions, Buffers, Env, Episode, Options, Step, Threads, VecEnv, Which, check_env};
 use trueup::sim2real::Timestamp;
 
@@ -376,4 +379,27 @@ fn a_book_is_there_when_an_episode_begins_in_the_midst() {
         assert_eq!(one, other, "from {start}");
     }
     assert!(rows > 0);
+}
+
+/// 2,000 at 100 on 100,000 of equity; at 66 equity is 32,000, and the broker closes: there is nothing more for the learner to do.
+#[test]
+fn a_margin_call_ends_an_episode() {
+    let history = bars(&[(100.0, 100.0), (100.0, 66.0), (66.0, 66.0), (66.0, 66.0), (66.0, 66.0)]);
+    let settings = with(of(&[Terms::default().with_regulation_t()]));
+    let backtest = Backtest::new(vec![instrument("A")], vec![history], venue(&[]), settings).unwrap();
+    let setup = MarketSetup { warm_up: 0, ..MarketSetup::new(backtest) };
+    let mut doubled = portfolio(1);
+    doubled.leverage = 2.0;
+    let mut called = env(setup.clone(), doubled);
+    let told = played(&mut called, Episode::default(), 9, |_, _| vec![1.0]);
+    assert_eq!((told.rewards.len(), told.last, called.ended()), (1, Some((true, false)), Ended::MarginCall));
+    assert!((told.rewards[0] + 0.68).abs() < 1e-12, "{:?}", told.rewards);
+    let channel = called.about().info.iter().position(|channel| channel.name == "ended").unwrap();
+    assert_eq!(called.info(channel), f64::from(Ended::MarginCall as u8));
+    let record = called.record().unwrap().unwrap();
+    assert_eq!((record.account.margin_calls.len(), record.blotter.fills[0].quantity.to_f64()), (1, 2_000.0));
+    // With what the account can carry the episode goes on to the end of the data.
+    let mut carried = env(setup, portfolio(1));
+    let told = played(&mut carried, Episode::default(), 9, |_, _| vec![1.0]);
+    assert_eq!((told.last, carried.ended()), (Some((false, true)), Ended::Data));
 }

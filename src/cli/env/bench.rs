@@ -1,5 +1,6 @@
 //! `trueup env bench`: how fast environments are.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
@@ -8,10 +9,12 @@ use serde::Serialize;
 use super::super::screen::Screen;
 use super::super::stop::{Outcome, Stop};
 use super::{entry, refused};
-use crate::io::{InputError, hint_among};
+use crate::io::{InputError, RunFile, hint_among};
+use crate::market;
+use crate::market::env::MarketSetup;
 use crate::rl::{
-    About, Actions, AutoresetMode, Buffers, Checked, EnvError, Episode, OptionAbout, OptionKind, OptionValue, Options,
-    Space, SplitMix64, StreamName, Threads, VecEnv, Which,
+    About, Actions, AutoresetMode, Buffers, Checked, EnvEntry, EnvError, Episode, OptionAbout, OptionKind, OptionValue,
+    Options, Space, SplitMix64, StreamName, Threads, VecEnv, Which,
 };
 
 /// Measure how fast an environment is: steps a second, with random actions and automatic resets
@@ -23,7 +26,8 @@ use crate::rl::{
 Examples:
   trueup env bench CartPole-v0
   trueup env bench trueup/CartPole-v0 --lanes 4096 --threads 2
-  trueup env bench Trade-v0 --lanes 1 --set length=500 --json")]
+  trueup env bench Trade-v0 --lanes 1 --set length=500 --json
+  trueup env bench Trade-v0 --run data/bars/run.toml --set length=0")]
 pub(super) struct Bench {
     /// Environment, as `trueup env list` names it; `trueup/` may be left out
     #[arg(value_name = "ID")]
@@ -31,6 +35,10 @@ pub(super) struct Bench {
     /// Environments stepped together
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     lanes: u32,
+    /// Run whose market the environment is in: its data, venue, account, and what it draws anew for each episode; of market
+    /// environments, which else have generated data
+    #[arg(long, value_name = "RUN.toml")]
+    run: Option<PathBuf>,
     /// Option of the environment, as NAME=VALUE; may be given more than once
     #[arg(long = "set", value_name = "NAME=VALUE")]
     options: Vec<String>,
@@ -79,6 +87,16 @@ impl Bench {
         Ok(Outcome::Done)
     }
 
+    /// The market of the run that was asked for.
+    fn setup(&self, entry: &EnvEntry) -> Result<Option<MarketSetup>, InputError> {
+        let Some(path) = &self.run else { return Ok(None) };
+        if market::ENVIRONMENTS.iter().all(|known| known.id != entry.id) {
+            let message = format!("`{}` is in no market", entry.id);
+            return Err(InputError::new("--run", message).hint("`trueup env list` tells which trade"));
+        }
+        MarketSetup::from_run(&RunFile::read(path)?).map(Some)
+    }
+
     fn measured(&self) -> Result<Measured, InputError> {
         if !(self.seconds > 0.0 && self.seconds <= 60.0) {
             return Err(InputError::new("--seconds", "a round cannot be this long").found(self.seconds).hint("up to 60 s"));
@@ -86,12 +104,17 @@ impl Bench {
         let entry = entry(&self.id)?;
         let refused = |error: EnvError| refused(entry.id, &error);
         let options = parsed(&self.options, &entry.describe().map_err(refused)?)?;
+        let setup = self.setup(entry)?;
+        let make = |lanes: usize| match &setup {
+            Some(setup) => market::env::make_on(entry.id, lanes, setup.clone(), &options),
+            None => (entry.make)(lanes, &options),
+        };
         let lanes = self.lanes as usize;
         let threads = rayon::current_num_threads().min(lanes);
         let env: Box<dyn VecEnv> = if threads > 1 {
-            Box::new(Threads::new(lanes, threads, |lanes| (entry.make)(lanes, &options)).map_err(refused)?)
+            Box::new(Threads::new(lanes, threads, make).map_err(refused)?)
         } else {
-            (entry.make)(lanes, &options).map_err(refused)?
+            make(lanes).map_err(refused)?
         };
         let mut run = Run::begin(env).map_err(refused)?;
         // What is not yet in memory or caches is no part of the speed.
