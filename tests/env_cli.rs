@@ -55,7 +55,8 @@ fn a_bench_tells_the_median_and_the_spread() {
         assert!((measured["steps_per_second"].as_f64().unwrap() * median / 1e9 - 1.0).abs() < 1e-9);
         assert!(measured["steps"].as_u64().unwrap() > 0);
     }
-    let (code, out, err) = run("env bench Trade-v0 --run data/bars/run.toml --set length=0 --rounds 1 --seconds 0.01 --json");
+    let (code, out, err) =
+        run("env bench Trade-v0 --run data/bars/run.toml --set length=0 --rounds 1 --seconds 0.01 --json");
     assert_eq!((code, err.as_str()), (0, ""));
     assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["id"], "trueup/Trade-v0");
     let (code, out, _) = run("env bench CartPole-v0 --rounds 1 --seconds 0.01");

@@ -193,6 +193,8 @@ struct Calm {
     variogram: Vec<(f64, f64)>,
     /// Mean squared move at times over that of the whole tape, in even steps from the first.
     restless: Vec<f64>,
+    /// How long one lasts [s].
+    step: f64,
     first: Timestamp,
     /// Least variance [bps^2]: that of mids that are rounded to half ticks.
     least: f64,
@@ -205,6 +207,8 @@ const TIMES: usize = 16;
 /// Time between the moves that tell how restless the market is [s], for how long on each side they are averaged, and how far that
 /// is believed.
 const STEP: f64 = 10.0;
+/// Most such moves: over a longer tape, or one of whose rows one has the stamp of another year, they are further apart.
+const STEPS: f64 = 1e6;
 const AROUND: usize = 30;
 const BELIEVED: (f64, f64) = (0.1, 10.0);
 
@@ -222,16 +226,17 @@ impl Calm {
         let least = mid(0.5 * span).map_or(0.0, |mid| (tick_size / mid * 1e4).powi(2) / 24.0);
         let times = (0..TIMES).map(|k| SHORTEST * 2.0_f64.powi(k as i32)).filter(|seconds| *seconds < 0.5 * span);
         let variogram = times.map(|seconds| (seconds.ln(), mean_square(seconds).max(least).ln())).collect();
-        let steps = (span / STEP) as usize;
+        let step = STEP.max(span / STEPS);
+        let steps = (span / step) as usize;
         let squares: Vec<f64> =
-            (0..steps).map(|k| moved(k as f64 * STEP, (k + 1) as f64 * STEP).map_or(0.0, |m| m * m)).collect();
-        Self { variogram, restless: around(&squares), first, least }
+            (0..steps).map(|k| moved(k as f64 * step, (k + 1) as f64 * step).map_or(0.0, |m| m * m)).collect();
+        Self { variogram, restless: around(&squares), step, first, least }
     }
 
     /// Standard deviation of the move between two times [bps].
     fn scatter(&self, from: Timestamp, to: Timestamp) -> f64 {
         let middle = 0.5 * (from.seconds_since(self.first) + to.seconds_since(self.first));
-        let restless = self.restless.get((middle / STEP).max(0.0) as usize).copied().unwrap_or(1.0);
+        let restless = self.restless.get((middle / self.step).max(0.0) as usize).copied().unwrap_or(1.0);
         let variance = self.variance(to.seconds_since(from)) * restless;
         variance.max(self.least).sqrt()
     }
@@ -295,4 +300,28 @@ pub(super) fn shows_own(tape: &Tape, orders: &[InFlight], traded: &[(Timestamp, 
     let moves: Vec<f64> = moves.collect();
     let count = moves.len() as f64;
     moves.len() >= ENOUGH && moves.iter().sum::<f64>() / count.sqrt() > CERTAIN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::market::{Level, Quotes};
+
+    /// One stamp of another year makes a tape long, and nothing of it large.
+    #[test]
+    fn a_tape_of_sixty_years_is_looked_at_in_steps_that_are_longer() {
+        let mut quotes = Quotes::with_depth(1);
+        let year = 31_557_600.0;
+        let seconds = (0..1_000).map(|k| f64::from(k) * 0.5).chain([60.0 * year]);
+        for (k, at) in seconds.enumerate() {
+            let mid = 100.0 + 0.01 * (k % 7) as f64;
+            let level = |price: f64| [Level { price, size: 1.0 }];
+            quotes.push(Timestamp(0).plus_seconds(at), &level(mid - 0.01), &level(mid + 0.01));
+        }
+        let calm = Calm::of(&Tape::new(quotes, Vec::new(), Vec::new()), 0.01);
+        let steps = calm.restless.len() as f64;
+        assert!((0.99 * STEPS..=STEPS).contains(&steps), "{steps}");
+        let within = calm.scatter(Timestamp(0).plus_seconds(3.0), Timestamp(0).plus_seconds(4.0));
+        assert!(within.is_finite() && within > 0.0, "{within}");
+    }
 }

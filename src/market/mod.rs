@@ -69,6 +69,7 @@ pub mod paper;
 #[cfg(feature = "io")]
 pub mod paper_run;
 mod past;
+mod places;
 #[cfg(feature = "io")]
 mod preset;
 mod price_assumption;

@@ -8,6 +8,8 @@ use super::Quotes;
 const OLDEST: i64 = 3_600 * Timestamp::NANOS;
 /// Most rows of the tape that are looked at before a decision.
 const ROWS: usize = 20_000;
+/// Orders that are asked at most, evenly over all: the pasts that each could have seen are many.
+const ASKED: usize = 400;
 /// Fewer orders than these tell nothing.
 const ENOUGH: usize = 25;
 /// The part of the orders that one age must explain: what was seen of other things than the tape is not for an age to say.
@@ -34,14 +36,20 @@ pub(super) enum ShownAge {
 /// The age at which `quotes` show the mids that orders saw, each with the time of its decision [currency]; the middle of all ages
 /// that explain as many.
 pub(super) fn shown_age(quotes: &Quotes, seen: &[(Timestamp, f64)]) -> ShownAge {
-    // An age at which an order begins, and one after which it ceases, to be explained.
-    let mut ends: Vec<(i64, i32)> = Vec::new();
-    let mut timely = 0;
-    for (decided_at, mid) in seen {
-        let ages = ages(quotes, *decided_at, *mid);
-        timely += usize::from(ages.first().is_some_and(|(least, _)| *least == 0));
-        ends.extend(ages.into_iter().flat_map(|(least, most)| [(least, 1), (most + 1, -1)]));
+    let as_shown = |(decided_at, mid): &(Timestamp, f64)| {
+        let known = quotes.times().partition_point(|time| time <= decided_at);
+        let last = known.checked_sub(1).and_then(|row| quotes.all().get(row)?.mid());
+        last.is_some_and(|own| alike(own, *mid))
+    };
+    let timely = seen.iter().filter(|one| as_shown(one)).count();
+    if quotes.is_empty() || seen.len() < ENOUGH || seen.len() - timely < OTHERWISE {
+        return ShownAge::Timely;
     }
+    let asked: Vec<&(Timestamp, f64)> = seen.iter().step_by(seen.len().div_ceil(ASKED)).collect();
+    let timely = asked.iter().filter(|one| as_shown(one)).count();
+    // An age at which an order begins, and one after which it ceases, to be explained.
+    let ages = asked.iter().flat_map(|(decided_at, mid)| ages(quotes, *decided_at, *mid));
+    let mut ends: Vec<(i64, i32)> = ages.flat_map(|(least, most)| [(least, 1), (most + 1, -1)]).collect();
     ends.sort_unstable();
     let (mut count, mut best, mut within) = (0_i32, 0, (0, 0));
     for (k, (age, step)) in ends.iter().enumerate() {
@@ -52,10 +60,8 @@ pub(super) fn shown_age(quotes: &Quotes, seen: &[(Timestamp, f64)]) -> ShownAge 
             (best, within) = (count, (*age, next - 1));
         }
     }
-    let (explained, known) = (usize::try_from(best).unwrap_or_default(), seen.len());
-    if quotes.is_empty() || known < ENOUGH || known - timely < OTHERWISE {
-        ShownAge::Timely
-    } else if (explained as f64) < EXPLAINED * known as f64 {
+    let (explained, known) = (usize::try_from(best).unwrap_or_default(), asked.len());
+    if (explained as f64) < EXPLAINED * known as f64 {
         ShownAge::Unclear { explained, known }
     } else if explained <= timely {
         ShownAge::Timely

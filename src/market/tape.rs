@@ -2,6 +2,8 @@
 
 use crate::sim2real::Timestamp;
 
+use super::places::Places;
+use super::quote::Quote;
 use super::{Bar, Book, InFlight, Quotes, Side};
 
 /// A trade the market printed.
@@ -60,6 +62,8 @@ impl Seen {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tape {
     quotes: Quotes,
+    /// Where in time the quotes are.
+    places: Places,
     prints: Vec<Print>,
     bars: Vec<Bar>,
     notes: Vec<String>,
@@ -72,7 +76,7 @@ impl Tape {
     pub fn new(quotes: Quotes, mut prints: Vec<Print>, mut bars: Vec<Bar>) -> Self {
         prints.sort_by_key(|print| print.time);
         bars.sort_by_key(|bar| bar.known_at);
-        Self { quotes, prints, bars, notes: Vec::new() }
+        Self { places: Places::of(quotes.times()), quotes, prints, bars, notes: Vec::new() }
     }
 
     /// Adds what a reader of results should know about the tape.
@@ -115,8 +119,15 @@ impl Tape {
     /// The displayed book last `seen`.
     #[must_use]
     pub fn book(&self, seen: Seen) -> Option<Book> {
-        let last = seen.count(self.quotes.times(), |time| *time).checked_sub(1)?;
-        self.quotes.all().get(last).map(|quote| quote.book())
+        Some(self.quote(seen)?.book())
+    }
+
+    /// The quote last `seen`.
+    fn quote(&self, seen: Seen) -> Option<Quote<'_>> {
+        let times = self.quotes.times();
+        let known = self.places.count(times, seen.decided_at, |time| *time <= seen.decided_at);
+        let met = self.places.count(times, seen.until, |time| *time < seen.until);
+        self.quotes.all().get(known.max(met).checked_sub(1)?)
     }
 
     /// Price of the last trade `seen` [currency].
@@ -145,7 +156,7 @@ impl Tape {
     #[must_use]
     pub fn mid(&self, seen: Seen) -> Option<f64> {
         if !self.quotes.is_empty() {
-            return self.book(seen)?.mid();
+            return self.quote(seen)?.mid();
         }
         self.last_price(seen).or_else(|| self.bar_close(seen)).or_else(|| self.next_open(seen))
     }
