@@ -5,13 +5,20 @@ use crate::sim2real::Timestamp;
 use super::{Book, Level};
 
 /// The quotes of one instrument, oldest first, in flat arrays.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Quotes {
     times: Vec<Timestamp>,
     /// `depth` bids, then `depth` asks, a quote; those beyond `counts` are not there.
     levels: Vec<Level>,
+    /// Levels of each quote, bids and asks; none where all quotes have all levels.
     counts: Vec<[u8; 2]>,
     depth: usize,
+}
+
+impl PartialEq for Quotes {
+    fn eq(&self, other: &Self) -> bool {
+        self.all() == other.all()
+    }
 }
 
 /// One quote; a side with no levels is empty.
@@ -67,8 +74,12 @@ impl Quotes {
             self.levels.extend_from_slice(&side[..count]);
             self.levels.resize(self.levels.len() + depth - count, Level::default());
         }
+        let (full, own) = ([depth as u8; 2], [bids.len().min(depth) as u8, asks.len().min(depth) as u8]);
+        if own != full || !self.counts.is_empty() {
+            self.counts.resize(self.times.len(), full);
+            self.counts.push(own);
+        }
         self.times.push(time);
-        self.counts.push([bids.len().min(depth) as u8, asks.len().min(depth) as u8]);
     }
 
     /// Number of quotes.
@@ -106,7 +117,9 @@ impl Quotes {
         let gone = self.len().saturating_sub(count);
         self.times.drain(..gone);
         self.levels.drain(..2 * self.depth * gone);
-        self.counts.drain(..gone);
+        if !self.counts.is_empty() {
+            self.counts.drain(..gone);
+        }
     }
 
     /// Makes room for `depth` levels a side.
@@ -138,19 +151,25 @@ impl Quotes {
         QuoteSlice {
             times: &self.times[start..end],
             levels: &self.levels[2 * self.depth * start..2 * self.depth * end],
-            counts: &self.counts[start..end],
+            counts: if self.counts.is_empty() { &[] } else { &self.counts[start..end] },
             depth: self.depth,
         }
     }
 }
 
 /// Some quotes in a row, oldest first. It holds nothing of those before and after.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct QuoteSlice<'a> {
     times: &'a [Timestamp],
     levels: &'a [Level],
     counts: &'a [[u8; 2]],
     depth: usize,
+}
+
+impl PartialEq for QuoteSlice<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.len() == other.len() && (0..self.len()).all(|k| self.get(k) == other.get(k))
+    }
 }
 
 impl<'a> QuoteSlice<'a> {
@@ -175,13 +194,10 @@ impl<'a> QuoteSlice<'a> {
     /// Quote `k`, from 0 for the oldest.
     #[must_use]
     pub fn get(&self, k: usize) -> Option<Quote<'a>> {
-        let [bids, asks] = *self.counts.get(k)?;
+        let time = *self.times.get(k)?;
+        let [bids, asks] = self.counts.get(k).copied().unwrap_or([self.depth as u8; 2]);
         let levels = &self.levels[2 * self.depth * k..];
-        Some(Quote {
-            time: self.times[k],
-            bids: &levels[..usize::from(bids)],
-            asks: &levels[self.depth..self.depth + usize::from(asks)],
-        })
+        Some(Quote { time, bids: &levels[..usize::from(bids)], asks: &levels[self.depth..self.depth + usize::from(asks)] })
     }
 
     /// The newest.
@@ -209,5 +225,32 @@ mod tests {
         assert_eq!(quotes.between(0, 1).last().unwrap().time, Timestamp(1));
         assert_eq!(quotes.between(1, 9).len(), 1);
         assert!(quotes.all().get(2).is_none() && Quotes::default().all().last().is_none());
+    }
+    /// That some lack levels is kept of all only where some do; whoever reads sees no difference.
+    #[test]
+    fn what_quotes_have_does_not_depend_on_the_others() {
+        let level = |price: f64| [Level { price, size: 10.0 }];
+        let made = |asks: &[Option<f64>]| {
+            let mut quotes = Quotes::with_depth(1);
+            for (k, ask) in asks.iter().enumerate() {
+                let ask: Vec<Level> = ask.iter().flat_map(|price| level(*price)).collect();
+                quotes.push(Timestamp(k as i64), &level(99.0), &ask);
+            }
+            quotes
+        };
+        let (full, poor) = (made(&[Some(101.0), Some(102.0)]), made(&[Some(101.0), Some(102.0), None, Some(103.0)]));
+        assert_eq!(full.all(), poor.between(0, 2));
+        assert_ne!(full.all(), poor.between(1, 3));
+        let asks: Vec<Option<f64>> = (0..4).map(|k| poor.all().get(k).unwrap().ask()).collect();
+        assert_eq!(asks, [Some(101.0), Some(102.0), None, Some(103.0)]);
+        let mut newest = poor.clone();
+        newest.keep_newest(1);
+        let mut alone = Quotes::with_depth(1);
+        alone.push(Timestamp(3), &level(99.0), &level(103.0));
+        assert_eq!(newest, alone);
+        let mut other = full.clone();
+        other.push(Timestamp(2), &level(99.0), &[]);
+        assert_eq!(other.all(), poor.between(0, 3));
+        assert_ne!(other, full);
     }
 }
