@@ -69,7 +69,6 @@ pub mod paper;
 #[cfg(feature = "io")]
 pub mod paper_run;
 mod past;
-mod places;
 #[cfg(feature = "io")]
 mod preset;
 mod price_assumption;
@@ -117,6 +116,7 @@ pub mod tape_orders;
 #[cfg(feature = "io")]
 mod tapes;
 mod ticket;
+mod time_index;
 mod transit;
 #[cfg(feature = "io")]
 mod twin;

@@ -264,8 +264,8 @@ impl OrderLog {
             ShownAge::Timely => None,
             ShownAge::Unclear { explained, known } => {
                 self.notes.push(format!(
-                    "what {known} orders saw (`seen_bid`, `seen_ask`) is not what the tape showed at any one age: at the best of \
-                     {explained}; nothing is made of it"
+                    "what orders saw (`seen_bid`, `seen_ask`) is not what the tape showed at any one age: of {known} that were asked \
+                     at the best {explained} saw it; nothing is made of it"
                 ));
                 None
             }

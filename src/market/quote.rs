@@ -226,6 +226,7 @@ mod tests {
         assert_eq!(quotes.between(1, 9).len(), 1);
         assert!(quotes.all().get(2).is_none() && Quotes::default().all().last().is_none());
     }
+
     /// That some lack levels is kept of all only where some do; whoever reads sees no difference.
     #[test]
     fn what_quotes_have_does_not_depend_on_the_others() {

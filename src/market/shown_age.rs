@@ -24,11 +24,11 @@ pub(super) enum ShownAge {
     Timely,
     /// It is what the tape showed so long before [s].
     Aged(f64),
-    /// At no one age is it what the tape showed: at the best, of so many of so many orders.
+    /// At no one age is it what the tape showed: at the best, of so many of the orders that were asked.
     Unclear {
         /// Orders that saw what the tape showed at the best age.
         explained: usize,
-        /// Orders of which is known what they saw.
+        /// Orders that were asked.
         known: usize,
     },
 }
@@ -141,5 +141,24 @@ mod tests {
         assert_eq!(shown_age(&quotes(), &orders(SECOND, 1_000)[..20]), ShownAge::Timely, "too few to tell");
         assert_eq!(shown_age(&quotes(), &orders(SECOND, 5)), ShownAge::Unclear { explained: 80, known: 100 });
         assert_eq!(shown_age(&Quotes::default(), &orders(0, 1_000)), ShownAge::Timely);
+    }
+
+    /// Of many orders some are asked, and few that saw something else are no age.
+    #[test]
+    fn of_many_orders_some_are_asked() {
+        let many = |age: i64, others: usize| -> Vec<(Timestamp, f64)> {
+            let one = |k: i64| {
+                let at = Timestamp(10 * SECOND + k * SECOND / 4 + (k * 37 % 100) * SECOND / 1_000);
+                (at, 100.0 + ((at.0 - age) / SECOND) as f64)
+            };
+            let mut orders: Vec<(Timestamp, f64)> = (0..1_500).map(one).collect();
+            orders.iter_mut().step_by(1_500 / others.max(1)).take(others).for_each(|order| order.1 = 7.0);
+            orders
+        };
+        let ShownAge::Aged(found) = shown_age(&quotes(), &many(3 * SECOND / 2, 0)) else { panic!("no age") };
+        assert!((found - 1.5).abs() <= 0.02, "{found}");
+        assert_eq!(shown_age(&quotes(), &many(0, 9)), ShownAge::Timely);
+        let ShownAge::Unclear { explained, known } = shown_age(&quotes(), &many(SECOND, 300)) else { panic!("an age") };
+        assert!(explained < known && known <= ASKED, "{explained} of {known}");
     }
 }

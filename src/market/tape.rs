@@ -2,8 +2,8 @@
 
 use crate::sim2real::Timestamp;
 
-use super::places::Places;
 use super::quote::Quote;
+use super::time_index::TimeIndex;
 use super::{Bar, Book, InFlight, Quotes, Side};
 
 /// A trade the market printed.
@@ -63,7 +63,7 @@ impl Seen {
 pub struct Tape {
     quotes: Quotes,
     /// Where in time the quotes are.
-    places: Places,
+    index: TimeIndex,
     prints: Vec<Print>,
     bars: Vec<Bar>,
     notes: Vec<String>,
@@ -76,7 +76,7 @@ impl Tape {
     pub fn new(quotes: Quotes, mut prints: Vec<Print>, mut bars: Vec<Bar>) -> Self {
         prints.sort_by_key(|print| print.time);
         bars.sort_by_key(|bar| bar.known_at);
-        Self { places: Places::of(quotes.times()), quotes, prints, bars, notes: Vec::new() }
+        Self { index: TimeIndex::of(quotes.times()), quotes, prints, bars, notes: Vec::new() }
     }
 
     /// Adds what a reader of results should know about the tape.
@@ -125,8 +125,8 @@ impl Tape {
     /// The quote last `seen`.
     fn quote(&self, seen: Seen) -> Option<Quote<'_>> {
         let times = self.quotes.times();
-        let known = self.places.count(times, seen.decided_at, |time| *time <= seen.decided_at);
-        let met = self.places.count(times, seen.until, |time| *time < seen.until);
+        let known = self.index.count(times, seen.decided_at, |time| *time <= seen.decided_at);
+        let met = self.index.count(times, seen.until, |time| *time < seen.until);
         self.quotes.all().get(known.max(met).checked_sub(1)?)
     }
 

@@ -7,7 +7,7 @@ const ROWS: usize = 8;
 
 /// Of rows in order of time, how many come before each of many equal spans of it.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Places {
+pub(super) struct TimeIndex {
     first: Timestamp,
     /// A span lasts two to this power [ns].
     shift: u32,
@@ -15,7 +15,7 @@ pub(super) struct Places {
     before: Vec<u32>,
 }
 
-impl Places {
+impl TimeIndex {
     /// Of rows of these times, which are in order.
     pub fn of(times: &[Timestamp]) -> Self {
         let (Some(first), Some(last), Ok(count)) = (times.first(), times.last(), u32::try_from(times.len())) else {
@@ -24,15 +24,15 @@ impl Places {
         let lasts = last.0.abs_diff(first.0);
         let most = (times.len() / ROWS).max(1) as u64;
         let shift = (0..u64::BITS).find(|shift| lasts >> shift < most).unwrap_or(u64::BITS - 1);
-        let mut places = Self { first: *first, shift, before: Vec::new() };
+        let mut index = Self { first: *first, shift, before: Vec::new() };
         let spans = (lasts >> shift) as usize + 1;
-        places.before.reserve_exact(spans + 1);
+        index.before.reserve_exact(spans + 1);
         for (row, time) in (0..count).zip(times) {
-            let span = places.span(*time);
-            places.before.resize(places.before.len().max(span + 1), row);
+            let span = index.span(*time);
+            index.before.resize(index.before.len().max(span + 1), row);
         }
-        places.before.resize(spans + 1, count);
-        places
+        index.before.resize(spans + 1, count);
+        index
     }
 
     fn span(&self, time: Timestamp) -> usize {
@@ -70,11 +70,11 @@ mod tests {
         ) {
             times.sort_unstable();
             let times: Vec<Timestamp> = times.into_iter().map(Timestamp).collect();
-            let places = Places::of(&times);
+            let index = TimeIndex::of(&times);
             for time in asked.into_iter().map(Timestamp).chain(times.iter().copied()) {
                 let (upto, with) = (|row: &Timestamp| *row < time, |row: &Timestamp| *row <= time);
-                prop_assert_eq!(places.count(&times, time, upto), times.partition_point(upto));
-                prop_assert_eq!(places.count(&times, time, with), times.partition_point(with));
+                prop_assert_eq!(index.count(&times, time, upto), times.partition_point(upto));
+                prop_assert_eq!(index.count(&times, time, with), times.partition_point(with));
             }
         }
     }
