@@ -62,6 +62,18 @@ fn a_chain_of_two_rows_by_hand() {
     assert!((log - paths[0].0.ln()).abs() < 1e-14);
 }
 
+/// States that hardly ever stay: each row is of another state than its neighbours, the first and the last among them.
+#[test]
+fn a_path_that_alternates_is_found_to_its_ends() {
+    let transition = vec![vec![0.1, 0.9], vec![0.9, 0.1]];
+    let model = HiddenMarkov::new(vec![0.5, 0.5], transition, vec![state(0.0, 1.0), state(5.0, 1.0)]).unwrap();
+    let rows = [0.2, 4.9, -0.3, 5.4, 0.1];
+    for length in 1..=rows.len() {
+        let (path, _) = model.viterbi(Observations::of(&rows[..length]).unwrap()).unwrap();
+        assert_eq!(path, [0, 1, 0, 1, 0][..length]);
+    }
+}
+
 /// Of a short series, sums and maxima over all paths, with a row that was lost.
 #[test]
 fn recursions_are_sums_over_all_paths() {

@@ -45,7 +45,7 @@ pub(super) fn shown_age(quotes: &Quotes, seen: &[(Timestamp, f64)]) -> ShownAge 
     if quotes.is_empty() || seen.len() < ENOUGH || seen.len() - timely < OTHERWISE {
         return ShownAge::Timely;
     }
-    let asked: Vec<&(Timestamp, f64)> = seen.iter().step_by(seen.len().div_ceil(ASKED)).collect();
+    let asked: Vec<&(Timestamp, f64)> = asked(seen.len()).map(|k| &seen[k]).collect();
     let timely = asked.iter().filter(|one| as_shown(one)).count();
     // An age at which an order begins, and one after which it ceases, to be explained.
     let ages = asked.iter().flat_map(|(decided_at, mid)| ages(quotes, *decided_at, *mid));
@@ -68,6 +68,16 @@ pub(super) fn shown_age(quotes: &Quotes, seen: &[(Timestamp, f64)]) -> ShownAge 
     } else {
         ShownAge::Aged(0.5 * (within.0 + within.1) as f64 / Timestamp::NANOS as f64)
     }
+}
+
+/// Which of `count` orders are asked: one of each of [`ASKED`] equal parts, at another place in each, since every so many th of
+/// orders that are sent by a clock might always fall at the same part of a second.
+fn asked(count: usize) -> impl Iterator<Item = usize> {
+    /// Parts of the golden section are spread evenly, however many there are.
+    const SECTION: f64 = 0.618_033_988_749_894_9;
+    let parts = count.min(ASKED);
+    let place = if count > ASKED { SECTION } else { 0.0 };
+    (0..parts).map(move |k| ((k as f64 + (place * k as f64).fract()) * count as f64 / parts as f64) as usize)
 }
 
 /// The ages at which `quotes` show `mid` to whoever decides at `decided_at`, from the least on: least and most [ns], which do not
@@ -148,7 +158,7 @@ mod tests {
     fn of_many_orders_some_are_asked() {
         let many = |age: i64, others: usize| -> Vec<(Timestamp, f64)> {
             let one = |k: i64| {
-                let at = Timestamp(10 * SECOND + k * SECOND / 4 + (k * 37 % 100) * SECOND / 1_000);
+                let at = Timestamp(10 * SECOND + k * SECOND / 4 + (k * 37 % 100) * SECOND / 400);
                 (at, 100.0 + ((at.0 - age) / SECOND) as f64)
             };
             let mut orders: Vec<(Timestamp, f64)> = (0..1_500).map(one).collect();
