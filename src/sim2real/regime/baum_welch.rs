@@ -264,7 +264,7 @@ struct Counting<'a> {
 
 impl Visit for Counting<'_> {
     #[inline(always)]
-    fn visit(&mut self, seen: Seen) {
+    fn visit(&mut self, seen: Seen, _: &mut [f64]) {
         let row = self.part.row(seen.row);
         if !is_lost(row) {
             self.expected.moments.add(row, seen.posterior, Some(self.densities));
@@ -285,20 +285,37 @@ impl Visit for Counting<'_> {
 
 impl Expected {
     fn of(model: &HiddenMarkov, series: &[Observations], family: Family, trellis: &mut Trellis) -> Self {
+        let (mut expected, mut back) = (Self::nothing(model, family), Self::nothing(model, family));
+        for part in series.iter().filter(|part| !part.is_empty()) {
+            trellis.forward(model, *part);
+            expected.log_likelihood += trellis.log_likelihood;
+            expected.transition.iter_mut().zip(&trellis.crossing).for_each(|(sum, count)| *sum += count);
+            let counting = |expected| Counting { expected, part: *part, densities: model.densities() };
+            trellis.backward(model, &mut counting(&mut expected), &mut counting(&mut back));
+        }
+        expected.join(&back);
+        expected
+    }
+
+    /// What is expected of no series.
+    fn nothing(model: &HiddenMarkov, family: Family) -> Self {
         let states = model.states();
         let centers = model.emissions().iter().flat_map(|e| e.mean.iter().copied()).collect();
-        let mut expected = Self {
+        Self {
             log_likelihood: 0.0,
             initial: vec![0.0; states],
             transition: vec![0.0; states * states],
             moments: Moments::new(centers, model.width(), family),
-        };
-        for part in series.iter().filter(|part| !part.is_empty()) {
-            trellis.forward(model, *part);
-            expected.log_likelihood += trellis.log_likelihood;
-            trellis.backward(model, &mut Counting { expected: &mut expected, part: *part, densities: model.densities() });
         }
-        expected
+    }
+
+    /// Adds what was counted from last rows back: transitions to and fro, and first rows that are last ones.
+    fn join(&mut self, back: &Self) {
+        let states = self.initial.len();
+        for (k, sum) in self.transition.iter_mut().enumerate() {
+            *sum += back.transition[k % states * states + k / states];
+        }
+        self.moments.join(&back.moments);
     }
 
     /// The model under which what is expected is likeliest.

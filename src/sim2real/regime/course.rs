@@ -1,4 +1,4 @@
-//! The recursion forward: what is believed of the states from row to row, so scaled that no product of densities underflows.
+//! The recursion over rows: what is believed of the states from row to row, so scaled that no product of densities underflows.
 
 use std::f64::consts::LN_2;
 
@@ -20,7 +20,7 @@ const fn power_of_two(exponent: i64) -> f64 {
 }
 
 /// One number for each state: an array where the compiler knows how many there are, which it then keeps in registers.
-pub(super) trait PerState: AsRef<[f64]> + AsMut<[f64]> + Clone {
+pub(super) trait PerState: AsRef<[f64]> + AsMut<[f64]> + Clone + Send + Sync {
     /// A copy of these numbers.
     fn of(numbers: &[f64]) -> Self;
 }
@@ -53,16 +53,16 @@ pub(super) struct Course<S> {
 }
 
 impl<S: PerState> Course<S> {
-    /// Before the first row.
-    pub fn new(model: &HiddenMarkov) -> Self {
-        let initial = || S::of(model.initial());
-        Self { joint: initial(), predicted: initial(), mass: 1.0, log: 0.0, observed: 0 }
+    /// Before any row, with what is known of the state before it.
+    pub fn new(begin: &[f64]) -> Self {
+        Self { joint: S::of(begin), predicted: S::of(begin), mass: 1.0, log: 0.0, observed: 0 }
     }
 
     /// Takes the next row, of which `weights` are the densities over the highest. These times what is returned are the density of the row in
-    /// each state over its density given all before; of a state that cannot be the weight may be set to 0.
+    /// each state over its density given all before; of a state that cannot be the weight may be set to 0. `transition` is that of the
+    /// way the recursion goes, `[from][to]`.
     #[inline(always)]
-    pub fn step(&mut self, model: &HiddenMarkov, row: &[f64], weights: &mut S) -> f64 {
+    pub fn step(&mut self, model: &HiddenMarkov, transition: &[f64], row: &[f64], weights: &mut S) -> f64 {
         let mut mass = 0.0;
         let before = self.predicted.as_ref().iter();
         for ((joint, weight), before) in self.joint.as_mut().iter_mut().zip(weights.as_ref()).zip(before) {
@@ -80,7 +80,7 @@ impl<S: PerState> Course<S> {
         }
         self.mass = mass;
         self.observed += u64::from(!is_lost(row));
-        predict(model.transition(), self.joint.as_ref(), self.predicted.as_mut());
+        predict(transition, self.joint.as_ref(), self.predicted.as_mut());
         inverse
     }
 
@@ -96,6 +96,47 @@ impl<S: PerState> Course<S> {
     /// Logarithm of the density of all rows so far.
     pub fn log_likelihood(&self, model: &HiddenMarkov) -> f64 {
         self.observed as f64 * model.densities().highest + self.log + self.mass.ln()
+    }
+
+    /// What is known where this recursion, from the first row on, meets one from the last row `back`; `None` where hardly anything
+    /// that the one holds possible is possible to the other, so that digits would be lost.
+    pub fn meet<'a>(&'a self, back: &'a Self, model: &HiddenMarkov) -> Option<Meeting<'a, S>> {
+        let together: f64 = self.joint.as_ref().iter().zip(back.predicted.as_ref()).map(|(here, there)| here * there).sum();
+        // Not a number is no meeting either.
+        let met = together >= FAINT;
+        let rest = self.log + back.log + together.ln();
+        let log_likelihood = (self.observed + back.observed) as f64 * model.densities().highest + rest;
+        met.then_some(Meeting { first: self, back, together, log_likelihood })
+    }
+}
+
+/// Where two recursions meet.
+pub(super) struct Meeting<'a, S> {
+    first: &'a Course<S>,
+    back: &'a Course<S>,
+    /// Density of all rows, over the factors of both.
+    together: f64,
+    /// Logarithm of the density of all rows.
+    pub log_likelihood: f64,
+}
+
+impl<S: PerState> Meeting<'_, S> {
+    /// For each state of the last row of the first half, how much more likely all that follow are than they are given those before.
+    pub fn after_first(&self) -> Vec<f64> {
+        let factor = self.first.mass / self.together;
+        self.back.predicted.as_ref().iter().map(|there| there * factor).collect()
+    }
+
+    /// The same of the last half seen from its end: for each state of its first row, of the rows before.
+    pub fn before_last(&self) -> Vec<f64> {
+        let factor = self.back.mass / self.together;
+        self.first.predicted.as_ref().iter().map(|here| here * factor).collect()
+    }
+
+    /// Expected number of transitions from the one half into the other, over their probability, `[from][to]`.
+    pub fn crossing(&self) -> Vec<f64> {
+        let to = self.back.joint.as_ref();
+        self.first.joint.as_ref().iter().flat_map(|from| to.iter().map(move |to| from * (to / self.together))).collect()
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use pulp::{Arch, NullaryFnOnce};
 use statrs::function::gamma::ln_gamma;
 
+use super::chain::Way;
 use super::course::PerState;
 use super::{Emission, HiddenMarkov, Observations, RegimeError, Spread};
 use crate::sim2real::elementary::{exp, ln_1p};
@@ -209,33 +210,50 @@ pub(super) enum Evaluated {
 /// A stretch of a series, and what is evaluated of its rows.
 pub(super) struct Block<'a> {
     pub model: &'a HiddenMarkov,
-    /// Number of its first row.
-    pub from: usize,
     pub rows: Observations<'a>,
     /// `[group of rows][state][row]`.
     values: &'a [[f64; LANES]],
 }
 
 impl Block<'_> {
-    /// Shows `see` each row with what is evaluated of it in each state.
+    /// Shows `see` each row, in the order of the way, with what is evaluated of it in each state.
     #[inline(always)]
-    pub fn each_row<S: PerState>(&self, mut see: impl FnMut(&[f64], &mut S)) {
+    pub fn each_row<S: PerState, W: Way>(&self, mut see: impl FnMut(&[f64], &mut S)) {
         let mut of_row = S::of(self.model.initial());
         let states = of_row.as_ref().len();
-        for (group, values) in self.values.chunks_exact(states).enumerate() {
+        let groups = self.rows.len().div_ceil(LANES);
+        for k in 0..groups {
+            let group = if W::BACK { groups - 1 - k } else { k };
             let rows = self.rows.slice(group * LANES, (group + 1) * LANES);
-            for (lane, row) in rows.iter().enumerate() {
-                for (value, rows) in of_row.as_mut().iter_mut().zip(values) {
-                    *value = rows[lane % LANES];
-                }
-                see(row, &mut of_row);
+            let values = &self.values[group * states..][..states];
+            if W::BACK {
+                each_of(rows.iter().enumerate().rev(), values, &mut of_row, &mut see);
+            } else {
+                each_of(rows.iter().enumerate(), values, &mut of_row, &mut see);
             }
         }
     }
 }
 
-/// Evaluates a series block by block, each with the widest vectors of the processor: bit by bit what is evaluated of each row by itself.
-pub(super) fn each_block<'a>(
+/// Shows `see` the rows of a group.
+#[inline(always)]
+fn each_of<'a, S: PerState>(
+    rows: impl Iterator<Item = (usize, &'a [f64])>,
+    values: &[[f64; LANES]],
+    of_row: &mut S,
+    see: &mut impl FnMut(&[f64], &mut S),
+) {
+    for (lane, row) in rows {
+        for (value, rows) in of_row.as_mut().iter_mut().zip(values) {
+            *value = rows[lane % LANES];
+        }
+        see(row, of_row);
+    }
+}
+
+/// Evaluates a series block by block in the order of the way, each with the widest vectors of the processor: bit by bit what is evaluated
+/// of each row by itself.
+pub(super) fn each_block<'a, W: Way>(
     model: &'a HiddenMarkov,
     evaluated: Evaluated,
     series: Observations<'a>,
@@ -243,10 +261,12 @@ pub(super) fn each_block<'a>(
 ) {
     let groups = BLOCK.min(series.len()).div_ceil(LANES);
     let mut values = vec![[0.0; LANES]; groups * model.states()];
-    for from in (0..series.len()).step_by(BLOCK) {
+    let blocks = series.len().div_ceil(BLOCK);
+    for k in 0..blocks {
+        let from = BLOCK * if W::BACK { blocks - 1 - k } else { k };
         let rows = series.slice(from, from + BLOCK);
         Arch::new().dispatch(Evaluation { densities: model.densities(), evaluated, rows, into: &mut values });
-        see(&Block { model, from, rows, values: &values });
+        see(&Block { model, rows, values: &values });
     }
 }
 

@@ -48,6 +48,17 @@ impl Moments {
         }
     }
 
+    /// Adds sums over other rows, of deviations from the same centers.
+    pub fn join(&mut self, others: &Self) {
+        let add = |sums: &mut [f64], others: &[f64]| sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += other);
+        add(&mut self.rows, &others.rows);
+        add(&mut self.weights, &others.weights);
+        add(&mut self.spans, &others.spans);
+        add(&mut self.first, &others.first);
+        add(&mut self.second, &others.second);
+        self.heavy |= others.heavy;
+    }
+
     /// Adds a row that was observed, with the probability of each state.
     #[inline(always)]
     pub fn add(&mut self, row: &[f64], probabilities: &[f64], densities: Option<&Densities>) {

@@ -79,6 +79,11 @@ impl<'a> Observations<'a> {
         Self { values: &self.values[from.min(to) * self.width..to * self.width], width: self.width }
     }
 
+    /// The first `middle` rows, and the others.
+    pub(super) fn split(&self, middle: usize) -> (Self, Self) {
+        (self.slice(0, middle), self.slice(middle, self.len()))
+    }
+
     /// Number of rows that were not lost.
     #[must_use]
     pub fn observed(&self) -> usize {
