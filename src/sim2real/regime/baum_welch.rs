@@ -3,11 +3,12 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::chain::{awake, middle};
 use super::densities::Densities;
 use super::moments::Moments;
 use super::observations::is_lost;
 use super::starts;
-use super::trellis::{Seen, Trellis, Visit};
+use super::trellis::{Arrivals, Seen, Trellis, Visit};
 use super::{Degrees, Emission, Family, HiddenMarkov, Observations, RegimeError, Settings, Spread};
 
 /// Rows of which starts are tried: of a longer series a sample of stretches, and the best start goes on over all of it.
@@ -228,6 +229,14 @@ struct Climb {
 }
 
 fn climb(start: HiddenMarkov, series: &[Observations], settings: &Settings, floors: &[f64], most: usize) -> Climb {
+    if series.iter().any(|part| middle(part.len()).is_some()) {
+        awake(|| climbed(start, series, settings, floors, most))
+    } else {
+        climbed(start, series, settings, floors, most)
+    }
+}
+
+fn climbed(start: HiddenMarkov, series: &[Observations], settings: &Settings, floors: &[f64], most: usize) -> Climb {
     let observed: usize = series.iter().map(Observations::observed).sum();
     let mut trellis = Trellis::default();
     let mut model = start;
@@ -270,15 +279,19 @@ impl Visit for Counting<'_> {
             self.expected.moments.add(row, seen.posterior, Some(self.densities));
         }
         let states = seen.posterior.len();
-        let Some(before) = seen.before else {
-            self.expected.initial.iter_mut().zip(seen.posterior).for_each(|(sum, p)| *sum += p);
-            return;
-        };
         let transition = &mut self.expected.transition[..states * states];
-        for (sums, from) in transition.chunks_exact_mut(states).zip(before) {
-            for (sum, to) in sums.iter_mut().zip(seen.ahead) {
-                *sum += from * to;
+        match seen.arrivals {
+            Arrivals::None => {
+                self.expected.initial.iter_mut().zip(seen.posterior).for_each(|(sum, p)| *sum += p);
             }
+            Arrivals::Products { before, ahead } => {
+                for (sums, from) in transition.chunks_exact_mut(states).zip(before) {
+                    for (sum, to) in sums.iter_mut().zip(ahead) {
+                        *sum += from * to;
+                    }
+                }
+            }
+            Arrivals::Each(counts) => transition.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count),
         }
     }
 }

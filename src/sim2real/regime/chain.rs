@@ -55,3 +55,8 @@ impl<'a, W: Way> Chain<'a, W> {
 pub(super) fn middle(rows: usize) -> Option<usize> {
     (rows >= LONG).then_some(rows / 2)
 }
+
+/// Does something in which threads are joined more than once: they are woken once only.
+pub(super) fn awake<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    rayon::scope(|_| work())
+}

@@ -3,6 +3,7 @@
 use std::f64::consts::LN_2;
 
 use super::HiddenMarkov;
+use super::in_logs;
 use super::observations::is_lost;
 
 /// Below this a mass is multiplied by a power of two, which costs no digits.
@@ -42,7 +43,7 @@ impl<const N: usize> PerState for [f64; N] {
 pub(super) struct Course<S> {
     /// Density of the rows so far together with each state, over a factor that all states share.
     joint: S,
-    /// The same of the state before the next row.
+    /// The same of the state before the next row; its logarithm where the model does not mix.
     predicted: S,
     /// Sum of `joint`.
     mass: f64,
@@ -54,8 +55,25 @@ pub(super) struct Course<S> {
 
 impl<S: PerState> Course<S> {
     /// Before any row, with what is known of the state before it.
-    pub fn new(begin: &[f64]) -> Self {
-        Self { joint: S::of(begin), predicted: S::of(begin), mass: 1.0, log: 0.0, observed: 0 }
+    pub fn new(model: &HiddenMarkov, begin: &[f64]) -> Self {
+        let mut predicted = S::of(begin);
+        if !model.mixes() {
+            predicted.as_mut().iter_mut().for_each(|probability| *probability = probability.ln());
+        }
+        Self { joint: S::of(begin), predicted, mass: 1.0, log: 0.0, observed: 0 }
+    }
+
+    /// Takes the next row of a model that does not mix, and writes the logarithms of what is believed, and of densities over the density
+    /// of the row given all before.
+    #[cold]
+    pub fn step_in_logs(&mut self, model: &HiddenMarkov, row: &[f64], beliefs: &mut [f64], ratios: &mut [f64]) {
+        let log = in_logs::step(model, row, self.predicted.as_mut(), beliefs, ratios);
+        for (joint, belief) in self.joint.as_mut().iter_mut().zip(&*beliefs) {
+            *joint = belief.exp();
+        }
+        ratios.iter_mut().for_each(|ratio| *ratio -= log);
+        self.log += log;
+        self.observed += u64::from(!is_lost(row));
     }
 
     /// Takes the next row, of which `weights` are the densities over the highest. These times what is returned are the density of the row in

@@ -1,6 +1,6 @@
 //! Which states a whole series was in: the probability of each in each row, and the likeliest path.
 
-use super::chain::{Back, Chain, Onward, Way, middle};
+use super::chain::{Back, Chain, Onward, Way, awake, middle};
 use super::course::PerState;
 use super::densities::{Block, Evaluated, each_block};
 use super::trellis::{self, Seen, Trellis, Visit};
@@ -33,10 +33,13 @@ impl HiddenMarkov {
     /// A series of another width than the model's.
     pub fn smooth(&self, series: Observations) -> Result<Vec<f64>, RegimeError> {
         self.check(series)?;
-        let mut trellis = Trellis::default();
-        trellis.forward(self, series);
-        trellis.backward(self, &mut InPlace, &mut InPlace);
-        Ok(trellis.beliefs)
+        let smooth = || {
+            let mut trellis = Trellis::default();
+            trellis.forward(self, series);
+            trellis.backward(self, &mut InPlace, &mut InPlace);
+            trellis.beliefs
+        };
+        Ok(if middle(series.len()).is_some() { awake(smooth) } else { smooth() })
     }
 
     /// The likeliest path of states given the whole series, and the logarithm of its density with the series (A. J. Viterbi,
@@ -69,10 +72,7 @@ fn likeliest<S: Origins>(model: &HiddenMarkov, series: Observations) -> (Vec<usi
     let together = first.scores.best.as_ref().iter().zip(last.scores.next.as_ref());
     let (state, score) = best(together.map(|(here, there)| here + there));
     let (here, there) = path.split_at_mut(middle);
-    rayon::join(
-        || first.trace(state, here.iter_mut().rev()),
-        || last.trace(last.next_of(state), there.iter_mut()),
-    );
+    rayon::join(|| first.trace(state, here.iter_mut().rev()), || last.trace(last.next_of(state), there.iter_mut()));
     (path, score)
 }
 

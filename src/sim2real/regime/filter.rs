@@ -22,7 +22,7 @@ impl Filter {
     #[must_use]
     pub fn new(model: HiddenMarkov) -> Self {
         let (belief, weights) = (model.initial().to_vec(), vec![0.0; model.states()]);
-        Self { course: Course::new(model.initial()), belief, weights, rows: 0, model }
+        Self { course: Course::new(&model, model.initial()), belief, weights, rows: 0, model }
     }
 
     /// Takes the next row, and gives the probability of each state.
@@ -35,6 +35,11 @@ impl Filter {
             return Err(self.refused(row));
         }
         self.rows += 1;
+        if !self.model.mixes() {
+            self.course.step_in_logs(&self.model, row, &mut self.belief, &mut self.weights);
+            self.course.believe(&mut self.belief);
+            return Ok(&self.belief);
+        }
         self.model.densities().weights(row, &mut self.weights);
         self.course.step(&self.model, self.model.transition(), row, &mut self.weights);
         self.course.believe(&mut self.belief);

@@ -22,7 +22,11 @@ pub struct HiddenMarkov {
     transition: Vec<f64>,
     emissions: Vec<Emission>,
     densities: Densities,
+    mixes: bool,
 }
+
+/// A transition below this may never be made: what it brings to a state is too little to be multiplied by a density.
+const RARE: f64 = 1e-100;
 
 /// A model as it is written down.
 #[derive(Serialize, Deserialize)]
@@ -80,7 +84,9 @@ impl HiddenMarkov {
             }
             probabilities("transitions from state", from, row)?;
         }
-        Ok(Self { initial, transition: transition.concat(), emissions, densities })
+        let transition = transition.concat();
+        let mixes = transition.iter().all(|probability| *probability >= RARE);
+        Ok(Self { initial, transition, emissions, densities, mixes })
     }
 
     /// Number of states.
@@ -116,6 +122,12 @@ impl HiddenMarkov {
     /// All transitions, row after row.
     pub(super) fn transition(&self) -> &[f64] {
         &self.transition
+    }
+
+    /// Whether every state leads to every other at once, so that what is left of a state never falls so low that numbers have no place for
+    /// it: otherwise recursions are in logarithms, which takes several times as long.
+    pub(super) fn mixes(&self) -> bool {
+        self.mixes
     }
 
     pub(super) fn densities(&self) -> &Densities {

@@ -22,6 +22,7 @@ mod error;
 mod filter;
 mod hazard;
 mod hidden_markov;
+mod in_logs;
 mod moments;
 mod observations;
 mod pelt;

@@ -3,7 +3,7 @@
 use super::chain::{Back, Chain, Onward, Way, middle};
 use super::course::{Course, LARGEST, PerState};
 use super::densities::{Block, Evaluated, each_block};
-use super::{HiddenMarkov, Observations};
+use super::{HiddenMarkov, Observations, in_logs};
 
 /// Runs from the first row on and shows each row's belief: what is found of a row rests on no later one.
 pub(super) fn follow(model: &HiddenMarkov, series: Observations, see: impl FnMut(&[f64])) {
@@ -18,10 +18,22 @@ pub(super) fn follow(model: &HiddenMarkov, series: Observations, see: impl FnMut
 #[inline(always)]
 fn follow_of<S: PerState>(model: &HiddenMarkov, series: Observations, mut see: impl FnMut(&[f64])) {
     let mut belief = S::of(model.initial());
-    run::<S, Onward>(&Chain::of(model), series, |course, _, _| {
-        course.believe(belief.as_mut());
-        see(belief.as_ref());
-    });
+    if model.mixes() {
+        run::<S, Onward>(&Chain::of(model), series, |course, _, _| {
+            course.believe(belief.as_mut());
+            see(belief.as_ref());
+        });
+    } else {
+        run_in_logs::<S>(model, series, |course, _, _| {
+            course.believe(belief.as_mut());
+            see(belief.as_ref());
+        });
+    }
+}
+
+/// Where a series is cut in two halves, of which the second is taken from its end; `None` where it is taken whole.
+fn cut(model: &HiddenMarkov, series: Observations) -> Option<usize> {
+    if model.mixes() { middle(series.len()) } else { None }
 }
 
 /// Logarithm of the density of a series.
@@ -35,9 +47,12 @@ pub(super) fn log_likelihood(model: &HiddenMarkov, series: Observations) -> f64 
 }
 
 fn log_likelihood_of<S: PerState>(model: &HiddenMarkov, series: Observations) -> f64 {
+    if !model.mixes() {
+        return run_in_logs::<S>(model, series, |_, _, _| ()).log_likelihood(model);
+    }
     let onward = |rows| run::<S, Onward>(&Chain::of(model), rows, |_, _, _| ());
     let back = |rows| run::<S, Back>(&Chain::of(model), rows, |_, _, _| ());
-    if let Some(middle) = middle(series.len()) {
+    if let Some(middle) = cut(model, series) {
         let (first, last) = series.split(middle);
         let (first, last) = rayon::join(|| onward(first), || back(last));
         if let Some(meeting) = first.meet(&last, model) {
@@ -49,13 +64,25 @@ fn log_likelihood_of<S: PerState>(model: &HiddenMarkov, series: Observations) ->
 
 /// Runs over a series; `see` is shown where the recursion is after each row, the row's weights, and what makes ratios of them.
 #[inline(always)]
-fn run<S: PerState, W: Way>(
-    chain: &Chain<W>,
-    series: Observations,
-    mut see: impl FnMut(&Course<S>, &S, f64),
-) -> Course<S> {
-    let mut course = Course::new(&chain.begin);
+fn run<S: PerState, W: Way>(chain: &Chain<W>, series: Observations, mut see: impl FnMut(&Course<S>, &S, f64)) -> Course<S> {
+    let mut course = Course::new(chain.model, &chain.begin);
     each_block::<W>(chain.model, Evaluated::Weights, series, |block| advance(block, chain, &mut course, &mut see));
+    course
+}
+
+/// Runs over a series of a model that does not mix, from the first row on; `see` is shown where the recursion is after each row, and
+/// logarithms of what is believed of it and of its ratios.
+fn run_in_logs<S: PerState>(
+    model: &HiddenMarkov,
+    series: Observations,
+    mut see: impl FnMut(&Course<S>, &[f64], &[f64]),
+) -> Course<S> {
+    let mut course = Course::<S>::new(model, model.initial());
+    let (mut beliefs, mut ratios) = (vec![0.0; model.states()], vec![0.0; model.states()]);
+    for row in series.iter() {
+        course.step_in_logs(model, row, &mut beliefs, &mut ratios);
+        see(&course, &beliefs, &ratios);
+    }
     course
 }
 
@@ -80,13 +107,21 @@ fn advance<S: PerState, W: Way>(
 pub(super) struct Seen<'a> {
     /// Its number in the series.
     pub row: usize,
-    /// What was believed of the row before it; nothing of the first.
-    pub before: Option<&'a [f64]>,
     /// Probability of each state given the whole series.
     pub posterior: &'a [f64],
-    /// For each state how much more likely the row and all that follow are than they were given all before: the expected number of
-    /// transitions into this row is `before[i] transition[i][j] ahead[j]`.
-    pub ahead: &'a [f64],
+    /// Transitions into it from the row before.
+    pub arrivals: Arrivals<'a>,
+}
+
+/// Expected number of transitions into a row, over their probability.
+pub(super) enum Arrivals<'a> {
+    /// There is no row before.
+    None,
+    /// The products of what was believed `before` and, for each state, how much more likely the row and all that follow are than they were
+    /// given all before.
+    Products { before: &'a [f64], ahead: &'a [f64] },
+    /// `[from][to]`.
+    Each(&'a [f64]),
 }
 
 /// Who is shown the rows by [`Trellis::backward`]: a trait, because its method can be told to be inlined.
@@ -130,11 +165,10 @@ impl Trellis {
     }
 
     fn forward_of<S: PerState>(&mut self, model: &HiddenMarkov, series: Observations) {
-        if let Some(middle) = middle(series.len()) {
+        if let Some(middle) = cut(model, series) {
             self.middle = middle;
             let ((first, last), (here, there)) = (series.split(middle), self.halves());
-            let (first, last) =
-                rayon::join(|| here.fill::<S, Onward>(model, first), || there.fill::<S, Back>(model, last));
+            let (first, last) = rayon::join(|| here.fill::<S, Onward>(model, first), || there.fill::<S, Back>(model, last));
             if let Some(meeting) = first.meet(&last, model) {
                 self.begins = [meeting.after_first(), meeting.before_last()];
                 self.crossing = meeting.crossing();
@@ -145,6 +179,11 @@ impl Trellis {
         self.middle = series.len();
         self.begins = [vec![1.0; self.states], vec![]];
         self.crossing.clear();
+        if !model.mixes() {
+            let places = self.beliefs.chunks_exact_mut(self.states).zip(self.ratios.chunks_exact_mut(self.states));
+            self.log_likelihood = fill_in_logs::<S>(model, series, places).log_likelihood(model);
+            return;
+        }
         self.log_likelihood = self.halves().0.fill::<S, Onward>(model, series).log_likelihood(model);
     }
 
@@ -166,6 +205,10 @@ impl Trellis {
     }
 
     fn backward_of<S: PerState>(&mut self, model: &HiddenMarkov, first: &mut impl Visit, last: &mut impl Visit) {
+        if !model.mixes() {
+            in_logs::sweep(model, &mut self.beliefs, &self.ratios, first);
+            return;
+        }
         let begins = std::mem::take(&mut self.begins);
         let (here, there) = self.halves();
         if there.beliefs.is_empty() {
@@ -225,7 +268,11 @@ impl Half<'_> {
             for probability in posterior.iter_mut() {
                 *probability *= inverse;
             }
-            visitor.visit(Seen { row: from + row, before, posterior, ahead }, belief);
+            let arrivals = match before {
+                Some(before) => Arrivals::Products { before, ahead },
+                None => Arrivals::None,
+            };
+            visitor.visit(Seen { row: from + row, posterior, arrivals }, belief);
             for from in 0..states {
                 let mut product = transition[from * states] * ahead[0];
                 for to in 1..states {
@@ -250,5 +297,18 @@ fn fill<'a, S: PerState, W: Way>(
             *ratio = weight * inverse;
         }
         course.believe(belief);
+    })
+}
+
+/// Fills places with logarithms, of a model that does not mix.
+fn fill_in_logs<'a, S: PerState>(
+    model: &HiddenMarkov,
+    rows: Observations,
+    mut places: impl Iterator<Item = (&'a mut [f64], &'a mut [f64])>,
+) -> Course<S> {
+    run_in_logs::<S>(model, rows, |_, beliefs, ratios| {
+        let Some((belief, ratio)) = places.next() else { return };
+        belief.copy_from_slice(beliefs);
+        ratio.copy_from_slice(ratios);
     })
 }

@@ -2,7 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop where it fails")]
 
+mod long;
+mod textbook;
+
 use proptest::prelude::*;
+use textbook::{Textbook, log_density};
 use trueup::sim2real::Seed;
 use trueup::sim2real::regime::{
     Assumed, Collapse, Cost, Degrees, Division, Emission, Family, Filter, HiddenMarkov, Observations, Penalty, Prior,
@@ -80,19 +84,12 @@ fn recursions_are_sums_over_all_paths() {
     let model = market();
     let rows = [0.001, -0.02, f64::NAN, 0.05, 0.004, -0.001, 0.0];
     let series = Observations::of(&rows).unwrap();
-    let log_density = |state: usize, x: f64| -> f64 {
-        if x.is_nan() {
-            return 0.0;
-        }
-        let (mean, variance) = (model.emissions()[state].mean[0], model.emissions()[state].variances()[0]);
-        -0.5 * ((x - mean).powi(2) / variance + (std::f64::consts::TAU * variance).ln())
-    };
     let (mut total, mut of_state, mut best) = (0.0, vec![0.0; 3 * rows.len()], (f64::NEG_INFINITY, vec![]));
     for code in 0..3_usize.pow(7) {
         let path: Vec<usize> = (0..7).map(|row| code / 3_usize.pow(row) % 3).collect();
         let mut log = model.initial()[path[0]].ln();
         log += path.windows(2).map(|w| model.transitions(w[0])[w[1]].ln()).sum::<f64>();
-        log += path.iter().zip(rows).map(|(state, x)| log_density(*state, x)).sum::<f64>();
+        log += path.iter().zip(rows).map(|(state, x)| log_density(&model.emissions()[*state], x)).sum::<f64>();
         total += log.exp();
         path.iter().enumerate().for_each(|(row, state)| of_state[3 * row + state] += log.exp());
         if log > best.0 {
@@ -117,39 +114,12 @@ fn far_rows_are_as_likely_as_logarithms_say() {
         rows[place] = far;
     }
     rows[100] = f64::NAN;
-    let densities = |x: f64| -> Vec<f64> {
-        let of = |e: &Emission| {
-            -0.5 * ((x - e.mean[0]).powi(2) / e.variances()[0] + (std::f64::consts::TAU * e.variances()[0]).ln())
-        };
-        model.emissions().iter().map(|e| if x.is_nan() { 0.0 } else { of(e) }).collect()
-    };
-    let sum = |logs: &[f64]| {
-        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        most + logs.iter().map(|log| (log - most).exp()).sum::<f64>().ln()
-    };
-    let log = |from: usize, to: usize| model.transitions(from)[to].ln();
-    let mut forward: Vec<Vec<f64>> = vec![];
-    for (row, x) in rows.iter().enumerate() {
-        let before = |to: usize| match row {
-            0 => model.initial()[to].ln(),
-            _ => sum(&(0..3).map(|from| forward[row - 1][from] + log(from, to)).collect::<Vec<_>>()),
-        };
-        forward.push((0..3).map(|to| before(to) + densities(*x)[to]).collect());
-    }
-    let mut backward = vec![vec![0.0; 3]; rows.len()];
-    for row in (0..rows.len() - 1).rev() {
-        let next = densities(rows[row + 1]);
-        let after =
-            |from: usize| sum(&(0..3).map(|to| log(from, to) + next[to] + backward[row + 1][to]).collect::<Vec<_>>());
-        backward[row] = (0..3).map(after).collect();
-    }
     let series = Observations::of(&rows).unwrap();
-    let (found, right) = (model.log_likelihood(series).unwrap(), sum(&forward[rows.len() - 1]));
-    assert!((found - right).abs() < 1e-11 * right.abs(), "{found} and {right}");
+    let (found, right) = (model.log_likelihood(series).unwrap(), Textbook::of(&model, &rows));
+    assert!((found - right.log_likelihood).abs() < 1e-11 * found.abs(), "{found} and {}", right.log_likelihood);
     for (row, smooth) in model.smooth(series).unwrap().chunks(3).enumerate() {
-        for (state, smooth) in smooth.iter().enumerate() {
-            let right = (forward[row][state] + backward[row][state] - right).exp();
-            assert!((smooth - right).abs() < 1e-6, "row {row}, state {state}: {smooth} and {right}");
+        for (smooth, right) in smooth.iter().zip(&right.posterior[row]) {
+            assert!((smooth - right).abs() < 1e-6, "row {row}: {smooth} and {right}");
         }
     }
 }

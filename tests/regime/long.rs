@@ -1,0 +1,123 @@
+//! Long series, which are taken from both ends at once, beside the recursions of textbooks.
+
+use trueup::sim2real::Seed;
+use trueup::sim2real::regime::{Filter, HiddenMarkov, Observations, Settings, refit};
+
+use super::textbook::{Textbook, log_density};
+use super::{market, state};
+
+/// A chain of so many states with levels 2 apart, of which each may stay or go one up or down, and nothing else.
+fn ladder(states: usize) -> HiddenMarkov {
+    let transition = |from: usize| -> Vec<f64> {
+        let near: Vec<f64> = (0..states).map(|to| [0.9, 0.05, 0.0][from.abs_diff(to).min(2)]).collect();
+        let sum: f64 = near.iter().sum();
+        near.iter().map(|p| p / sum).collect()
+    };
+    let mut initial = vec![0.0; states];
+    initial[0] = 1.0;
+    let levels = (0..states).map(|level| state(2.0 * level as f64, 1.0 + 0.3 * level as f64)).collect();
+    HiddenMarkov::new(initial, (0..states).map(transition).collect(), levels).unwrap()
+}
+
+fn check(model: &HiddenMarkov, rows: &[f64], case: &str) {
+    let series = Observations::of(rows).unwrap();
+    let right = Textbook::of(model, rows);
+    let close = |found: f64, right: f64| (found - right).abs() < 1e-10 * right.abs();
+    let found = model.log_likelihood(series).unwrap();
+    assert!(close(found, right.log_likelihood), "{case}: {found} and {}", right.log_likelihood);
+    let mut online = Filter::new(model.clone());
+    rows.iter().for_each(|x| drop(online.step(&[*x]).map(<[f64]>::len)));
+    assert!(close(online.log_likelihood(), right.log_likelihood), "{case}: {} online", online.log_likelihood());
+    for (row, smooth) in model.smooth(series).unwrap().chunks(model.states()).enumerate() {
+        for (smooth, right) in smooth.iter().zip(&right.posterior[row]) {
+            assert!((smooth - right).abs() < 1e-6, "{case}, row {row}: {smooth} and {right}");
+        }
+    }
+    // The path that was found is as likely as it says, and none is likelier.
+    let (path, log) = model.viterbi(series).unwrap();
+    let steps: f64 = path.windows(2).map(|pair| model.transitions(pair[0])[pair[1]].ln()).sum();
+    let densities: f64 = path.iter().zip(rows).map(|(state, x)| log_density(&model.emissions()[*state], *x)).sum();
+    let along = model.initial()[path[0]].ln() + steps + densities;
+    assert!(close(log, right.best) && close(along, right.best), "{case}: {log}, {along} along it, and {}", right.best);
+    // One iteration of Baum-Welch: what is expected, and what is likeliest then.
+    let few = Settings { iterations: 2, tolerance: 0.0, ..Settings::new(model.states()) };
+    let fit = refit(model, &[series], &few).unwrap().model;
+    let order = right_order(&right, rows);
+    for (state, was) in order.into_iter().enumerate() {
+        let [weight, mean, variance] = moments(&right, rows, was);
+        let found = &fit.emissions()[state];
+        assert!((found.mean[0] - mean).abs() < 1e-7 * variance.sqrt(), "{case}: mean {} and {mean}", found.mean[0]);
+        assert!(
+            (found.variances()[0] / variance - 1.0).abs() < 1e-7,
+            "{case}: variance {} of {weight}",
+            found.variances()[0]
+        );
+        let sum: f64 = right.transitions[was].iter().sum();
+        let stay = right.transitions[was][was] / sum;
+        assert!((fit.transitions(state)[state] - stay).abs() < 1e-8, "{case}: {} and {stay}", fit.transitions(state)[state]);
+        let mut found = fit.transitions(state).to_vec();
+        let mut right: Vec<f64> = right.transitions[was].iter().map(|count| count / sum).collect();
+        found.sort_by(f64::total_cmp);
+        right.sort_by(f64::total_cmp);
+        assert!(found.iter().zip(&right).all(|(a, b)| (a - b).abs() < 1e-8), "{case}: {found:?} and {right:?}");
+    }
+}
+
+/// Sum of probabilities, mean and variance of the rows in a state.
+fn moments(right: &Textbook, rows: &[f64], state: usize) -> [f64; 3] {
+    let seen = || rows.iter().zip(&right.posterior).filter(|(x, _)| !x.is_nan()).map(|(x, p)| (*x, p[state]));
+    let weight: f64 = seen().map(|(_, p)| p).sum();
+    let mean = seen().map(|(x, p)| p * x).sum::<f64>() / weight;
+    [weight, mean, seen().map(|(x, p)| p * (x - mean).powi(2)).sum::<f64>() / weight]
+}
+
+/// States in the order of the volatility that rows give them, as those of a fit are.
+fn right_order(right: &Textbook, rows: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..right.transitions.len()).collect();
+    order.sort_by(|a, b| moments(right, rows, *a)[2].total_cmp(&moments(right, rows, *b)[2]));
+    order
+}
+
+#[test]
+fn long_series_are_as_likely_as_textbooks_say() {
+    for states in 1..=6 {
+        let model = ladder(states);
+        for rows in [4_095, 4_096, 4_733] {
+            let drawn = model.simulate(rows, Seed(rows as u64)).values;
+            check(&model, &drawn, &format!("{states} states, {rows} rows"));
+        }
+    }
+}
+
+/// Rows that were lost, or are thousands of deviations from every state: at the ends, where halves meet, and anywhere.
+#[test]
+fn long_series_with_holes_and_far_rows() {
+    let model = market();
+    let mut rows = model.simulate(5_000, Seed(5)).values;
+    for (place, x) in [(0, 3.0), (63, -9.0), (2_499, 40.0), (2_500, f64::NAN), (2_501, -90.0), (3_000, 90.0), (4_999, 7.0)] {
+        rows[place] = x;
+    }
+    rows.iter_mut().skip(3).step_by(11).for_each(|x| *x = f64::NAN);
+    let series = Observations::of(&rows).unwrap();
+    let right = Textbook::of(&model, &rows);
+    let found = model.log_likelihood(series).unwrap();
+    assert!((found - right.log_likelihood).abs() < 1e-10 * found.abs(), "{found} and {}", right.log_likelihood);
+    for (smooth, right) in model.smooth(series).unwrap().iter().zip(right.posterior.iter().flatten()) {
+        assert!((smooth - right).abs() < 1e-6, "{smooth} and {right}");
+    }
+    let (_, log) = model.viterbi(series).unwrap();
+    assert!((log - right.best).abs() < 1e-10 * log.abs());
+}
+
+/// What the first half holds possible the other does not: two states of which neither is ever left.
+#[test]
+fn halves_that_contradict_each_other() {
+    let transition = vec![vec![1.0, 0.0], vec![0.0, 1.0]];
+    let model = HiddenMarkov::new(vec![0.5, 0.5], transition, vec![state(0.0, 1.0), state(5.0, 1.0)]).unwrap();
+    for change in [1_000, 2_500, 4_000] {
+        let rows: Vec<f64> = (0..5_000).map(|row| if row < change { 0.1 } else { 4.8 }).collect();
+        let right = Textbook::of(&model, &rows);
+        let found = model.log_likelihood(Observations::of(&rows).unwrap()).unwrap();
+        assert!((found - right.log_likelihood).abs() < 1e-10 * found.abs(), "{found} and {}", right.log_likelihood);
+    }
+}
