@@ -56,6 +56,8 @@ pub struct OrderLog {
     aspect: Aspect,
     shows_own_orders: bool,
     own_prints: Vec<Option<Timestamp>>,
+    /// Number of quotes that were known when each order was decided; none where there are too many.
+    known: Vec<u32>,
     shown_delay: Option<ShownDelay>,
     shown_age: Option<f64>,
     notes: Vec<String>,
@@ -155,6 +157,7 @@ impl OrderLog {
         discount(&mut looks, &market.tape, brought, own);
         let mut log = Self {
             rows: (0..in_flight.len()).map(Row::Order).collect(),
+            known: known(&market.tape, &in_flight),
             executed: executions.iter().map(|execution| execution.quantity).collect(),
             paid: executions.iter().map(|execution| execution.price).collect(),
             made,
@@ -193,6 +196,7 @@ impl OrderLog {
         let rows = (0..orders.len()).map(Row::Order).collect();
         let shows_own_orders = market.shows_own_orders.unwrap_or(false);
         let log = Self {
+            known: known(&market.tape, &orders),
             market,
             executed: orders.iter().map(|order| order.quantity).collect(),
             paid: vec![None; orders.len()],
@@ -397,6 +401,12 @@ impl OrderLog {
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
+}
+
+/// How many quotes of the tape were known when each order was decided: the same in every run of the log. None where there are too many.
+fn known(tape: &Tape, orders: &[InFlight]) -> Vec<u32> {
+    let known: Result<_, _> = orders.iter().map(|order| u32::try_from(tape.known(order.decided_at))).collect();
+    known.unwrap_or_default()
 }
 
 /// How far `price` is above `mid` [bps of it].

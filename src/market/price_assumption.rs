@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use super::{Book, Seen, Side, Tape};
+use super::quote::Quote;
+use super::{Seen, Side, Tape};
 
 /// Which price a twin assumes, as `[assumptions] price` names it: the one in force when an order was decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -55,14 +56,14 @@ impl PriceAssumption {
     /// The price as it stands for an order of `side` that has `seen` that much of `tape` [currency], where it is known.
     #[must_use]
     pub fn price(self, tape: &Tape, side: Side, seen: Seen) -> Option<f64> {
-        self.price_beside(tape.book(seen).as_ref(), tape, side, seen)
+        self.price_beside(tape.quote(seen), tape, side, seen)
     }
 
-    /// The same, for whoever has looked the book up already.
-    pub(super) fn price_beside(self, book: Option<&Book>, tape: &Tape, side: Side, seen: Seen) -> Option<f64> {
+    /// The same, for whoever has looked the quote up already.
+    pub(super) fn price_beside(self, quote: Option<Quote<'_>>, tape: &Tape, side: Side, seen: Seen) -> Option<f64> {
         match self {
-            Self::Mid => book?.mid(),
-            Self::Touch => book?.touch(side),
+            Self::Mid => quote?.mid(),
+            Self::Touch => Some(quote?.opposite(side).first()?.price),
             Self::Last => tape.last_price(seen),
             Self::BarClose => tape.bar_close(seen),
             Self::NextOpen => tape.next_open(seen),

@@ -2,7 +2,7 @@
 
 use crate::sim2real::Timestamp;
 
-use super::{Book, Level};
+use super::{Book, Level, Side};
 
 /// The quotes of one instrument, oldest first, in flat arrays.
 #[derive(Debug, Clone, Default)]
@@ -49,6 +49,21 @@ impl Quote<'_> {
     #[must_use]
     pub fn mid(&self) -> Option<f64> {
         Some(0.5 * (self.bid()? + self.ask()?))
+    }
+
+    /// The levels an order of `side` takes from, the best first.
+    #[must_use]
+    pub fn opposite(&self, side: Side) -> &[Level] {
+        match side {
+            Side::Buy => self.asks,
+            Side::Sell => self.bids,
+        }
+    }
+
+    /// What is displayed on the side an order of `side` takes from [units].
+    #[must_use]
+    pub fn displayed(&self, side: Side) -> f64 {
+        self.opposite(side).iter().map(|level| level.size).sum()
     }
 
     /// The book an order finds here.

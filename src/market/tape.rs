@@ -123,10 +123,22 @@ impl Tape {
     }
 
     /// The quote last `seen`.
-    fn quote(&self, seen: Seen) -> Option<Quote<'_>> {
-        let times = self.quotes.times();
-        let known = self.index.count(times, seen.decided_at, |time| *time <= seen.decided_at);
-        let met = self.index.count(times, seen.until, |time| *time < seen.until);
+    pub(super) fn quote(&self, seen: Seen) -> Option<Quote<'_>> {
+        self.quote_after(self.known(seen.decided_at), seen)
+    }
+
+    /// Number of quotes up to and with `time`.
+    pub(super) fn known(&self, time: Timestamp) -> usize {
+        self.index.count(self.quotes.times(), time, |row| *row <= time)
+    }
+
+    /// The quote last `seen`, for whoever has counted those that were `known` at the decision.
+    pub(super) fn quote_after(&self, known: usize, seen: Seen) -> Option<Quote<'_>> {
+        let met = if seen.until > seen.decided_at {
+            self.index.count(self.quotes.times(), seen.until, |time| *time < seen.until)
+        } else {
+            known
+        };
         self.quotes.all().get(known.max(met).checked_sub(1)?)
     }
 
@@ -168,11 +180,11 @@ impl Tape {
     /// is traded in the minute that begins with its arrival.
     #[must_use]
     pub fn volume(&self, side: Side, seen: Seen) -> f64 {
-        self.volume_beside(self.book(seen).as_ref(), side, seen)
+        self.volume_beside(self.quote(seen), side, seen)
     }
 
-    /// The same, for whoever has looked the book up already.
-    pub(super) fn volume_beside(&self, book: Option<&Book>, side: Side, seen: Seen) -> f64 {
+    /// The same, for whoever has looked the quote up already.
+    pub(super) fn volume_beside(&self, quote: Option<Quote<'_>>, side: Side, seen: Seen) -> f64 {
         const MINUTE: i64 = 60 * Timestamp::NANOS;
         let end = seen.end();
         if !self.bars.is_empty() {
@@ -180,7 +192,7 @@ impl Tape {
             return self.bars.get(within).filter(|bar| bar.open_at <= end).map_or(0.0, |bar| bar.volume);
         }
         if !self.quotes.is_empty() {
-            return book.map_or(0.0, |book| book.displayed(side));
+            return quote.map_or(0.0, |quote| quote.displayed(side));
         }
         if self.prints.is_empty() {
             return f64::INFINITY;

@@ -33,7 +33,7 @@ impl Clock {
 }
 
 /// What is sent to a plant.
-pub trait Command: Clone + Send + Sync + 'static {
+pub trait Command: Clone + PartialEq + Send + Sync + 'static {
     /// How a delay acts on it: a signal that holds needs a line of its past, a message only a later arrival.
     type Line: DelayLine<Self> + 'static;
 }
@@ -58,7 +58,7 @@ pub trait Stimulus<P: Plant>: Send + Sync {
     fn command_within(&self, row: usize, _share: f64) -> P::Command {
         self.command(row)
     }
-    /// What the plant meets in row `row`, given the command as it arrives.
+    /// What the plant meets in row `row`, given the command as it arrives: the same for the same command.
     fn input(&self, row: usize, arriving: &P::Command) -> P::Input;
     /// The commands, one a row, where a command is one number; none elsewhere.
     fn commands(&self) -> Option<&[f64]> {

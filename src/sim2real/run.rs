@@ -105,8 +105,7 @@ impl<P: Plant> Run<P> {
         input: impl Fn(&P::Command) -> P::Input,
         mut seen: impl FnMut(usize, &[P::Effect]),
     ) {
-        self.inputs.clear();
-        self.inputs.extend(self.commands.iter().map(input));
+        self.meet(input);
         self.effects.fill(P::Effect::default());
         for (k, law) in self.plant_laws.iter_mut().enumerate() {
             let scene =
@@ -115,6 +114,20 @@ impl<P: Plant> Run<P> {
             seen(k, &self.effects);
         }
         self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
+    }
+
+    /// What each lane meets. Parameters by which lanes differ seldom change what arrives, and looking up what it meets takes longer than
+    /// comparing.
+    fn meet(&mut self, input: impl Fn(&P::Command) -> P::Input) {
+        self.inputs.clear();
+        if size_of::<P::Input>() == 0 {
+            self.inputs.extend(self.commands.iter().map(input));
+            return;
+        }
+        for (lane, command) in self.commands.iter().enumerate() {
+            let same = lane.checked_sub(1).filter(|before| self.commands[*before] == *command);
+            self.inputs.push(same.map_or_else(|| input(command), |before| self.inputs[before].clone()));
+        }
     }
 
     /// As [`advance`](Self::advance), where every lane has its own clock and the inputs are there.

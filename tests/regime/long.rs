@@ -109,6 +109,25 @@ fn long_series_with_holes_and_far_rows() {
     assert!((log - right.best).abs() < 1e-10 * log.abs());
 }
 
+/// A chain that goes up and never back, its levels so far apart that what is left of a state is less than any number: a model of changes.
+#[test]
+fn a_chain_of_one_way_is_as_likely_as_textbooks_say() {
+    let transition = vec![vec![0.999, 0.001, 0.0], vec![0.0, 0.999, 0.001], vec![0.0, 0.0, 1.0]];
+    let levels = vec![state(0.0, 1.0), state(60.0, 2.0), state(-20.0, 3.0)];
+    let model = HiddenMarkov::new(vec![1.0, 0.0, 0.0], transition, levels).unwrap();
+    let drawn = model.simulate(5_000, Seed(2)).values;
+    check(&model, &drawn, "one way");
+    // And where the changes are of no such model.
+    let rows: Vec<f64> = (0..600).map(|row| [0.0, 60.0, 0.5, -20.0, 59.0, -21.0][row / 100]).collect();
+    let series = Observations::of(&rows).unwrap();
+    let right = Textbook::of(&model, &rows);
+    let found = model.log_likelihood(series).unwrap();
+    assert!((found - right.log_likelihood).abs() < 1e-10 * found.abs(), "{found} and {}", right.log_likelihood);
+    for (smooth, right) in model.smooth(series).unwrap().iter().zip(right.posterior.iter().flatten()) {
+        assert!((smooth - right).abs() < 1e-9, "{smooth} and {right}");
+    }
+}
+
 /// What the first half holds possible the other does not: two states of which neither is ever left.
 #[test]
 fn halves_that_contradict_each_other() {

@@ -376,6 +376,7 @@ proptest! {
         states in 1..6_usize,
         heavy in any::<bool>(),
         full in any::<bool>(),
+        sparse in any::<bool>(),
     ) {
         let spread = |variance: f64| {
             let covariance = |i: usize, j: usize| if i == j { variance } else { 0.3 * variance };
@@ -388,7 +389,12 @@ proptest! {
         };
         let transition = |from: usize| -> Vec<f64> {
             let to = |to: usize| if to == from { 0.9 } else { 0.1 / (states as f64 - 1.0) };
-            if states == 1 { vec![1.0] } else { (0..states).map(to).collect() }
+            match (states, sparse) {
+                (1, _) => vec![1.0],
+                // One state leads to the next, and nowhere else.
+                (_, true) => (0..states).map(|to| [0.9, 0.1, 0.0][((to + states - from) % states).min(2)]).collect(),
+                (_, false) => (0..states).map(to).collect(),
+            }
         };
         let emissions = (0..states).map(emission).collect();
         let initial = vec![1.0 / states as f64; states];

@@ -56,17 +56,30 @@ impl OrderLog {
     fn met(&self, number: usize, arriving: &InFlight) -> Met {
         let seen = Seen::by(arriving, self.own_prints[number]);
         let tape = self.tape();
-        let book = tape.book(seen);
+        let decided_at = self.orders[number].decided_at;
+        let quote = match self.known.get(number) {
+            Some(known) if arriving.decided_at == decided_at => tape.quote_after(*known as usize, seen),
+            _ => tape.quote(seen),
+        };
         // Where the tape has ended or shows one side only, the assumption stays as it was at the decision.
-        let price = self.market.price.price_beside(book.as_ref(), tape, arriving.side, seen);
+        let price = self.market.price.price_beside(quote, tape, arriving.side, seen);
         let reference = price.unwrap_or(arriving.assumed);
-        let volume = tape.volume_beside(book.as_ref(), arriving.side, seen);
-        let book = book.unwrap_or_else(|| Book::at_price(seen.end(), reference));
         // What rests joins the best price of its own side.
-        let joined = book.opposite(arriving.side.opposite()).first().filter(|_| arriving.role == Role::Maker);
-        let displayed = joined.map_or(0.0, |level| level.size);
-        let (seen, shows_own) = (self.moved_since_seen(arriving), self.shows_own_orders);
-        Met { displayed, seen, shows_own, ..Met::at(book, reference, volume) }
+        let own_side = arriving.side.opposite();
+        let joined = match &quote {
+            _ if arriving.role != Role::Maker => None,
+            Some(quote) => quote.opposite(own_side).first().map(|level| level.size),
+            None => Some(f64::INFINITY),
+        };
+        Met {
+            book: quote.map_or_else(|| Book::at_price(seen.end(), reference), |quote| quote.book()),
+            reference,
+            volume: tape.volume_beside(quote, arriving.side, seen),
+            displayed: joined.unwrap_or(0.0),
+            seen: self.moved_since_seen(arriving),
+            shows_own: self.shows_own_orders,
+            scatter: f64::INFINITY,
+        }
     }
 
     /// The mid that had been seen when `order` was decided, above what the mid was then [bps].
