@@ -11,7 +11,7 @@ use crate::sim2real::{
 pub(super) struct Wire;
 
 /// A command that holds until the next.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct Level(f64);
 
 impl AsMut<f64> for Level {

@@ -99,12 +99,18 @@ impl Group {
 
     /// Turns independent standard normal numbers, one a member, into correlated ones.
     #[inline]
-    pub fn correlate(&self, normal: &mut [f64]) {
+    pub fn correlate<const N: usize>(&self, normal: &mut [[f64; N]]) {
         // From the last row on: each needs those before it as they were.
         let mut end = self.factor.len();
         for row in (0..normal.len()).rev() {
             let start = end - (row + 1);
-            normal[row] = self.factor[start..end].iter().zip(&normal[..=row]).map(|(l, z)| l * z).sum();
+            let mut sums = [0.0; N];
+            for (l, z) in self.factor[start..end].iter().zip(&normal[..=row]) {
+                for k in 0..N {
+                    sums[k] += l * z[k];
+                }
+            }
+            normal[row] = sums;
             end = start;
         }
     }
@@ -174,15 +180,9 @@ mod tests {
         assert_eq!(made.len(), 1);
         assert_eq!(made[0].members, [0, 1, 3]);
         // L L' by what it makes of unit vectors.
-        let columns: Vec<Vec<f64>> = (0..3)
-            .map(|k| {
-                let mut unit = vec![0.0; 3];
-                unit[k] = 1.0;
-                made[0].correlate(&mut unit);
-                unit
-            })
-            .collect();
-        let product = |i: usize, j: usize| columns.iter().map(|column| column[i] * column[j]).sum::<f64>();
+        let mut columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        made[0].correlate(&mut columns);
+        let product = |i: usize, j: usize| columns[i].iter().zip(columns[j]).map(|(a, b)| a * b).sum::<f64>();
         for (i, j, expected) in [(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (0, 1, -0.3), (1, 2, 0.5), (0, 2, 0.0)] {
             assert!((product(i, j) - expected).abs() < 1e-12, "{i} {j}");
         }

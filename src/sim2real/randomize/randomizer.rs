@@ -3,7 +3,7 @@
 use super::correlation::{Correlation, CorrelationError, Group, groups};
 use super::distribution::Inverse;
 use super::level::Level;
-use super::normal::normal_quantile;
+use super::normal::{AT_ONCE, normal_quantile, normal_quantiles};
 use super::stream::{DrawKey, Occasion, Streams, name_key, uniform};
 use super::{DrawTable, Implausible, Randomized, Redraw, Target};
 use crate::sim2real::Seed;
@@ -160,12 +160,15 @@ impl Randomizer {
             }
         }
         for group in self.drawn_groups(occasion) {
-            let mut normal = vec![0.0; group.members.len()];
-            for (i, key) in keys.iter().enumerate() {
-                self.correlated(group, *key, &mut normal);
+            let mut normal = vec![[0.0; AT_ONCE]; group.members.len()];
+            for (part, keys) in keys.chunks(AT_ONCE).enumerate() {
+                for (z, k) in normal.iter_mut().zip(&group.members) {
+                    self.entries[*k].standard(keys, &mut z[..keys.len()]);
+                }
+                group.correlate(&mut normal);
                 for (k, z) in group.members.iter().zip(&normal) {
-                    let entry = &self.entries[*k];
-                    table.row_mut(*k)[i] = entry.levelled(*key, entry.inverse.at_normal(*z), level);
+                    let row = &mut table.row_mut(*k)[part * AT_ONCE..][..keys.len()];
+                    self.entries[*k].fill_by_normal(keys, &z[..keys.len()], row, level);
                 }
             }
         }
@@ -196,25 +199,17 @@ impl Randomizer {
             }
         }
         for group in self.drawn_groups(occasion) {
-            let mut normal = vec![0.0; group.members.len()];
-            self.correlated(group, key, &mut normal);
+            let standard = |k: &usize| [normal_quantile(uniform(key, self.entries[*k].key))];
+            let mut normal: Vec<[f64; 1]> = group.members.iter().map(standard).collect();
+            group.correlate(&mut normal);
             for (k, z) in group.members.iter().zip(&normal) {
-                let entry = &self.entries[*k];
-                table.row_mut(*k)[place] = entry.levelled(key, entry.inverse.at_normal(*z), level);
+                self.entries[*k].fill_by_normal(&[key], z, &mut table.row_mut(*k)[place..=place], level);
             }
         }
     }
 
     fn drawn_groups(&self, occasion: Occasion) -> impl Iterator<Item = &Group> {
         self.groups.iter().filter(move |group| self.entries[group.members[0]].part_in(occasion) == Part::Drawn)
-    }
-
-    /// Correlated standard normal numbers for the members of a group.
-    fn correlated(&self, group: &Group, key: u64, normal: &mut [f64]) {
-        for (z, k) in normal.iter_mut().zip(&group.members) {
-            *z = normal_quantile(uniform(key, self.entries[*k].key));
-        }
-        group.correlate(normal);
     }
 }
 
@@ -267,11 +262,35 @@ impl Entry {
                 let own = Inverse::Uniform { low: *low, high: *high };
                 self.fill_by(keys, row, level, |u| own.at(u));
             }
-            Inverse::Normal { mean, std } => {
-                let own = Inverse::Normal { mean: *mean, std: *std };
-                self.fill_by(keys, row, level, |u| own.at(u));
+            Inverse::Normal { .. } | Inverse::LogNormal { .. } if keys.len() > 1 => {
+                let mut normal = [0.0; AT_ONCE];
+                for (row, keys) in row.chunks_mut(AT_ONCE).zip(keys.chunks(AT_ONCE)) {
+                    let normal = &mut normal[..keys.len()];
+                    self.standard(keys, normal);
+                    self.fill_by_normal(keys, normal, row, level);
+                }
             }
             other => self.fill_by(keys, row, level, |u| other.at(u)),
+        }
+    }
+
+    /// Standard normal numbers for the environments of up to [`AT_ONCE`] `keys`.
+    fn standard(&self, keys: &[u64], normal: &mut [f64]) {
+        normal.iter_mut().zip(keys).for_each(|(z, key)| *z = uniform(*key, self.key));
+        match normal {
+            [z] => *z = normal_quantile(*z),
+            several => normal_quantiles(several),
+        }
+    }
+
+    /// Draws for the environments of `keys`, of which the copula says these standard `normal` numbers.
+    fn fill_by_normal(&self, keys: &[u64], normal: &[f64], row: &mut [f64], level: Level) {
+        if let (Inverse::Normal { mean, std }, true) = (&self.inverse, level == Level::FULL) {
+            row.iter_mut().zip(normal).for_each(|(to, z)| *to = (mean + std * z) * self.factor);
+            return;
+        }
+        for ((to, z), key) in row.iter_mut().zip(normal).zip(keys) {
+            *to = self.levelled(*key, self.inverse.at_normal(*z), level);
         }
     }
 
