@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::chain::{awake, middle};
+use super::chain::{LONG, awake, middle};
 use super::densities::Densities;
 use super::moments::Moments;
 use super::observations::is_lost;
@@ -229,7 +229,7 @@ struct Climb {
 }
 
 fn climb(start: HiddenMarkov, series: &[Observations], settings: &Settings, floors: &[f64], most: usize) -> Climb {
-    if series.iter().any(|part| middle(part.len()).is_some()) {
+    if series.iter().any(|part| middle(part.len(), LONG).is_some()) {
         awake(|| climbed(start, series, settings, floors, most))
     } else {
         climbed(start, series, settings, floors, most)

@@ -5,8 +5,12 @@ use std::marker::PhantomData;
 
 use super::HiddenMarkov;
 
-/// Rows from which on a series is taken from both ends: of fewer it takes longer to wake a second thread.
-const LONG: usize = 4_096;
+/// Rows from which on a series is taken from both ends, where a row takes some tens of nanoseconds: of fewer it takes longer to wake a
+/// second thread.
+pub(super) const LONG: usize = 4_096;
+
+/// The same where a row takes some nanoseconds.
+pub(super) const LONGER: usize = 16_384;
 
 /// Which way a recursion goes: a type, because its innermost loops are compiled for each.
 pub(super) trait Way: Send + Sync {
@@ -51,9 +55,10 @@ impl<'a, W: Way> Chain<'a, W> {
     }
 }
 
-/// Where a series of so many rows is cut in two halves, of which the second is taken from the last row back; `None` where it is taken whole.
-pub(super) fn middle(rows: usize) -> Option<usize> {
-    (rows >= LONG).then_some(rows / 2)
+/// Where a series of so many rows is cut in two halves, of which the second is taken from the last row back; `None` where it is taken whole,
+/// being shorter than `long`.
+pub(super) fn middle(rows: usize, long: usize) -> Option<usize> {
+    (rows >= long).then_some(rows / 2)
 }
 
 /// Does something in which threads are joined more than once: they are woken once only.

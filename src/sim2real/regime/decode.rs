@@ -1,6 +1,6 @@
 //! Which states a whole series was in: the probability of each in each row, and the likeliest path.
 
-use super::chain::{Back, Chain, Onward, Way, awake, middle};
+use super::chain::{Back, Chain, LONG, LONGER, Onward, Way, awake, middle};
 use super::course::PerState;
 use super::densities::{Block, Evaluated, each_block};
 use super::trellis::{self, Seen, Trellis, Visit};
@@ -39,7 +39,7 @@ impl HiddenMarkov {
             trellis.backward(self, &mut InPlace, &mut InPlace);
             trellis.beliefs
         };
-        Ok(if middle(series.len()).is_some() { awake(smooth) } else { smooth() })
+        Ok(if middle(series.len(), LONG).is_some() { awake(smooth) } else { smooth() })
     }
 
     /// The likeliest path of states given the whole series, and the logarithm of its density with the series (A. J. Viterbi,
@@ -61,7 +61,7 @@ impl HiddenMarkov {
 /// The likeliest path: of a long series that of each half, from its end, and which of them fit together.
 fn likeliest<S: Origins>(model: &HiddenMarkov, series: Observations) -> (Vec<usize>, f64) {
     let mut path = vec![0; series.len()];
-    let Some(middle) = middle(series.len()) else {
+    let Some(middle) = middle(series.len(), LONGER) else {
         let ways = Ways::<S>::of::<Onward>(model, series);
         let (last, score) = best(ways.scores.best.as_ref().iter().copied());
         ways.trace(last, path.iter_mut().rev());

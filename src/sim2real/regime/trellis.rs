@@ -1,6 +1,6 @@
 //! The recursions over a whole series: from its ends to where they meet, and on over what was found there.
 
-use super::chain::{Back, Chain, Onward, Way, middle};
+use super::chain::{Back, Chain, LONG, LONGER, Onward, Way, middle};
 use super::course::{Course, LARGEST, PerState};
 use super::densities::{Block, Evaluated, each_block};
 use super::{HiddenMarkov, Observations, in_logs};
@@ -32,8 +32,8 @@ fn follow_of<S: PerState>(model: &HiddenMarkov, series: Observations, mut see: i
 }
 
 /// Where a series is cut in two halves, of which the second is taken from its end; `None` where it is taken whole.
-fn cut(model: &HiddenMarkov, series: Observations) -> Option<usize> {
-    if model.mixes() { middle(series.len()) } else { None }
+fn cut(model: &HiddenMarkov, series: Observations, long: usize) -> Option<usize> {
+    if model.mixes() { middle(series.len(), long) } else { None }
 }
 
 /// Logarithm of the density of a series.
@@ -52,7 +52,7 @@ fn log_likelihood_of<S: PerState>(model: &HiddenMarkov, series: Observations) ->
     }
     let onward = |rows| run::<S, Onward>(&Chain::of(model), rows, |_, _, _| ());
     let back = |rows| run::<S, Back>(&Chain::of(model), rows, |_, _, _| ());
-    if let Some(middle) = cut(model, series) {
+    if let Some(middle) = cut(model, series, LONGER) {
         let (first, last) = series.split(middle);
         let (first, last) = rayon::join(|| onward(first), || back(last));
         if let Some(meeting) = first.meet(&last, model) {
@@ -165,7 +165,7 @@ impl Trellis {
     }
 
     fn forward_of<S: PerState>(&mut self, model: &HiddenMarkov, series: Observations) {
-        if let Some(middle) = cut(model, series) {
+        if let Some(middle) = cut(model, series, LONG) {
             self.middle = middle;
             let ((first, last), (here, there)) = (series.split(middle), self.halves());
             let (first, last) = rayon::join(|| here.fill::<S, Onward>(model, first), || there.fill::<S, Back>(model, last));
