@@ -124,6 +124,18 @@ fn check_densities(model: &HiddenMarkov, rows: &[f64]) {
     assert!((log - right.best).abs() < 1e-10 * log.abs());
 }
 
+/// States that hardly ever stay, so that the path changes where halves meet, whatever its length.
+#[test]
+fn a_long_path_that_alternates_is_found_where_halves_meet() {
+    let transition = vec![vec![0.1, 0.9], vec![0.9, 0.1]];
+    let model = HiddenMarkov::new(vec![0.5, 0.5], transition, vec![state(0.0, 1.0), state(5.0, 1.0)]).unwrap();
+    for count in [16_384, 16_385] {
+        let path: Vec<usize> = (0..count).map(|row| row % 2).collect();
+        let rows: Vec<f64> = path.iter().map(|state| 5.0 * *state as f64 + 0.2).collect();
+        assert!(model.viterbi(Observations::of(&rows).unwrap()).unwrap().0 == path, "{count} rows");
+    }
+}
+
 /// A chain that goes up and never back, its levels so far apart that what is left of a state is less than any number: a model of changes.
 #[test]
 fn a_chain_of_one_way_is_as_likely_as_textbooks_say() {
