@@ -47,8 +47,8 @@ pub(crate) fn exp(x: f64) -> f64 {
     let small = 1.0 + (rest + r2 * (low + (middle + high * r4) * r4));
     // The whole number is added to the exponent of 1.
     let power = f64::from_bits(ONE.wrapping_add(shifted.to_bits() << 52));
-    // A choice by bits, which a compiler does not take for a branch.
-    let kept = u64::from(x >= LEAST || x.is_nan()).wrapping_neg();
+    // A choice by bits, which a compiler does not take for a branch: none are kept of what is too low.
+    let kept = u64::from(x < LEAST).wrapping_sub(1);
     f64::from_bits((small * power).to_bits() & kept)
 }
 

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop where it fails")]
 
-mod long;
+mod both_ends;
 mod textbook;
 
 use proptest::prelude::*;
@@ -409,7 +409,8 @@ proptest! {
             prop_assert_eq!(bits(said), bits(&whole[row * states..][..states]));
         }
         let log = model.log_likelihood(Observations::rows(&all, width).unwrap()).unwrap();
-        prop_assert_eq!(online.log_likelihood().to_bits(), log.to_bits());
+        // That of a series is found from both its ends.
+        prop_assert!((online.log_likelihood() - log).abs() < 1e-10 * (1.0 + log.abs()), "{} and {log}", online.log_likelihood());
         let prefix = model.filter(Observations::rows(&past, width).unwrap()).unwrap();
         prop_assert_eq!(bits(&prefix), bits(&whole[..prefix.len()]));
     }

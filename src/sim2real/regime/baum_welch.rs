@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
+use wide::f64x2;
 
-use super::chain::{LONG, awake, middle};
 use super::densities::Densities;
+use super::ends::{Ends, Steps};
 use super::moments::Moments;
 use super::observations::is_lost;
 use super::starts;
@@ -229,14 +230,6 @@ struct Climb {
 }
 
 fn climb(start: HiddenMarkov, series: &[Observations], settings: &Settings, floors: &[f64], most: usize) -> Climb {
-    if series.iter().any(|part| middle(part.len(), LONG).is_some()) {
-        awake(|| climbed(start, series, settings, floors, most))
-    } else {
-        climbed(start, series, settings, floors, most)
-    }
-}
-
-fn climbed(start: HiddenMarkov, series: &[Observations], settings: &Settings, floors: &[f64], most: usize) -> Climb {
     let observed: usize = series.iter().map(Observations::observed).sum();
     let mut trellis = Trellis::default();
     let mut model = start;
@@ -248,7 +241,13 @@ fn climbed(start: HiddenMarkov, series: &[Observations], settings: &Settings, fl
         let converged = gain <= settings.tolerance * observed as f64;
         if converged || iterations == most {
             let Expected { log_likelihood, moments, .. } = expected;
-            return Climb { model, log_likelihood, rows: moments.rows, iterations, converged };
+            return Climb {
+                log_likelihood,
+                rows: (0..model.states()).map(|state| moments.rows(state)).collect(),
+                model,
+                iterations,
+                converged,
+            };
         }
         model = expected.maximize(&model, settings.family, floors);
     }
@@ -267,46 +266,53 @@ struct Expected {
 /// Adds up what is expected of one series.
 struct Counting<'a> {
     expected: &'a mut Expected,
-    part: Observations<'a>,
+    /// Of transitions, from either end, as they are come by.
+    transition: &'a mut [f64x2],
+    steps: Steps<'a>,
     densities: &'a Densities,
 }
 
 impl Visit for Counting<'_> {
     #[inline(always)]
-    fn visit(&mut self, seen: Seen, _: &mut [f64]) {
-        let row = self.part.row(seen.row);
-        if !is_lost(row) {
-            self.expected.moments.add(row, seen.posterior, Some(self.densities));
-        }
+    fn visit(&mut self, seen: Seen) {
+        let rows = std::array::from_fn(|end| if end < seen.ends { self.steps.row(seen.step, end) } else { None });
+        self.expected.moments.add(rows, seen.posterior, Some(self.densities));
         let states = seen.posterior.len();
-        let transition = &mut self.expected.transition[..states * states];
+        let transition = &mut self.transition[..states * states];
         match seen.arrivals {
             Arrivals::None => {
-                self.expected.initial.iter_mut().zip(seen.posterior).for_each(|(sum, p)| *sum += p);
+                self.expected.initial.iter_mut().zip(seen.posterior).for_each(|(sum, p)| *sum += p.at(0));
             }
             Arrivals::Products { before, ahead } => {
                 for (sums, from) in transition.chunks_exact_mut(states).zip(before) {
                     for (sum, to) in sums.iter_mut().zip(ahead) {
-                        *sum += from * to;
+                        *sum += *from * *to;
                     }
                 }
             }
-            Arrivals::Each(counts) => transition.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count),
+            Arrivals::Each(counts) => {
+                self.expected.transition.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+            }
         }
     }
 }
 
 impl Expected {
     fn of(model: &HiddenMarkov, series: &[Observations], family: Family, trellis: &mut Trellis) -> Self {
-        let (mut expected, mut back) = (Self::nothing(model, family), Self::nothing(model, family));
+        let (mut expected, states) = (Self::nothing(model, family), model.states());
+        let mut transition = vec![f64x2::ZERO; states * states];
         for part in series.iter().filter(|part| !part.is_empty()) {
             trellis.forward(model, *part);
             expected.log_likelihood += trellis.log_likelihood;
             expected.transition.iter_mut().zip(&trellis.crossing).for_each(|(sum, count)| *sum += count);
-            let counting = |expected| Counting { expected, part: *part, densities: model.densities() };
-            trellis.backward(model, &mut counting(&mut expected), &mut counting(&mut back));
+            let (steps, densities) = (Steps::of::<f64x2>(*part), model.densities());
+            let mut counting = Counting { expected: &mut expected, transition: &mut transition, steps, densities };
+            trellis.backward(model, &mut counting);
         }
-        expected.join(&back);
+        for (k, sum) in expected.transition.iter_mut().enumerate() {
+            // From the last row back transitions are to and fro.
+            *sum += transition[k].at(0) + transition[k % states * states + k / states].at(1);
+        }
         expected
     }
 
@@ -320,15 +326,6 @@ impl Expected {
             transition: vec![0.0; states * states],
             moments: Moments::new(centers, model.width(), family),
         }
-    }
-
-    /// Adds what was counted from last rows back: transitions to and fro, and first rows that are last ones.
-    fn join(&mut self, back: &Self) {
-        let states = self.initial.len();
-        for (k, sum) in self.transition.iter_mut().enumerate() {
-            *sum += back.transition[k % states * states + k / states];
-        }
-        self.moments.join(&back.moments);
     }
 
     /// The model under which what is expected is likeliest.

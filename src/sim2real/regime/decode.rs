@@ -1,18 +1,31 @@
 //! Which states a whole series was in: the probability of each in each row, and the likeliest path.
 
-use super::chain::{Back, Chain, LONG, LONGER, Onward, Way, awake, middle};
-use super::course::PerState;
+use std::ops::Range;
+
+use wide::{CmpGt, f64x2, u64x2};
+
 use super::densities::{Block, Evaluated, each_block};
+use super::ends::{Chain, Ends, LANES, PerState, Steps};
 use super::trellis::{self, Seen, Trellis, Visit};
 use super::{HiddenMarkov, Observations, RegimeError};
 
-/// Writes what is believed given the whole series over what was believed without what follows.
-struct InPlace;
+/// Writes what is believed given the whole series, `[row][state]`.
+struct Written<'a> {
+    steps: Steps<'a>,
+    into: &'a mut [f64],
+}
 
-impl Visit for InPlace {
+impl Visit for Written<'_> {
     #[inline(always)]
-    fn visit(&mut self, seen: Seen, belief: &mut [f64]) {
-        belief.copy_from_slice(seen.posterior);
+    fn visit(&mut self, seen: Seen) {
+        let states = seen.posterior.len();
+        for end in 0..seen.ends {
+            let row = self.steps.row_number(seen.step, end);
+            let Some(into) = self.into.get_mut(row * states..(row + 1) * states) else { continue };
+            for (into, posterior) in into.iter_mut().zip(seen.posterior) {
+                *into = posterior.at(end);
+            }
+        }
     }
 }
 
@@ -33,13 +46,11 @@ impl HiddenMarkov {
     /// A series of another width than the model's.
     pub fn smooth(&self, series: Observations) -> Result<Vec<f64>, RegimeError> {
         self.check(series)?;
-        let smooth = || {
-            let mut trellis = Trellis::default();
-            trellis.forward(self, series);
-            trellis.backward(self, &mut InPlace, &mut InPlace);
-            trellis.beliefs
-        };
-        Ok(if middle(series.len(), LONG).is_some() { awake(smooth) } else { smooth() })
+        let mut posterior = vec![0.0; series.len() * self.states()];
+        let mut trellis = Trellis::default();
+        trellis.forward(self, series);
+        trellis.backward(self, &mut Written { steps: Steps::of::<f64x2>(series), into: &mut posterior });
+        Ok(posterior)
     }
 
     /// The likeliest path of states given the whole series, and the logarithm of its density with the series (A. J. Viterbi,
@@ -50,94 +61,49 @@ impl HiddenMarkov {
     pub fn viterbi(&self, series: Observations) -> Result<(Vec<usize>, f64), RegimeError> {
         self.check(series)?;
         Ok(match self.states() {
-            2 => likeliest::<[f64; 2]>(self, series),
-            3 => likeliest::<[f64; 3]>(self, series),
-            4 => likeliest::<[f64; 4]>(self, series),
-            _ => likeliest::<Vec<f64>>(self, series),
+            2 => likeliest::<[f64x2; 2]>(self, series),
+            3 => likeliest::<[f64x2; 3]>(self, series),
+            4 => likeliest::<[f64x2; 4]>(self, series),
+            _ => likeliest::<Vec<f64x2>>(self, series),
         })
     }
 }
 
-/// The likeliest path: of a long series that of each half, from its end, and which of them fit together.
-fn likeliest<S: Origins>(model: &HiddenMarkov, series: Observations) -> (Vec<usize>, f64) {
+/// The likeliest path: that of each half from its end, and which of them fit together.
+fn likeliest<S: PerState<Of = f64x2>>(model: &HiddenMarkov, series: Observations) -> (Vec<usize>, f64) {
+    let ways = Ways::<S>::of(model, series);
+    let together = ways.scores.best.as_ref().iter().zip(ways.scores.next.as_ref());
+    let start = (0, f64::NEG_INFINITY);
+    // The first of the best.
+    let (state, score) = together
+        .map(|(here, there)| here.at(0) + there.at(1))
+        .enumerate()
+        .fold(start, |best, (state, score)| if score > best.1 { (state, score) } else { best });
     let mut path = vec![0; series.len()];
-    let Some(middle) = middle(series.len(), LONGER) else {
-        let ways = Ways::<S>::of::<Onward>(model, series);
-        let (last, score) = best(ways.scores.best.as_ref().iter().copied());
-        ways.trace(last, path.iter_mut().rev());
-        return (path, score);
-    };
-    let (first, last) = series.split(middle);
-    let (first, last) = rayon::join(|| Ways::<S>::of::<Onward>(model, first), || Ways::<S>::of::<Back>(model, last));
-    let together = first.scores.best.as_ref().iter().zip(last.scores.next.as_ref());
-    let (state, score) = best(together.map(|(here, there)| here + there));
-    let (here, there) = path.split_at_mut(middle);
-    rayon::join(|| first.trace(state, here.iter_mut().rev()), || last.trace(last.next_of(state), there.iter_mut()));
+    let (first, last) = path.split_at_mut(ways.steps.count);
+    if let Some(place) = first.last_mut() {
+        let count = ways.steps.count;
+        *place = state;
+        ways.trace(0, state, count - 1, |steps, state| first[steps].fill(state));
+        ways.trace(1, state, count, |steps, state| {
+            // The last half is come by from its end, and of the row behind the series nothing is told.
+            let to = (count - steps.start).min(last.len());
+            last[count - steps.end..to].fill(state);
+        });
+    }
     (path, score)
 }
 
-/// The first of the best scores.
-fn best(scores: impl Iterator<Item = f64>) -> (usize, f64) {
-    let start = (0, f64::NEG_INFINITY);
-    scores.enumerate().fold(start, |best, (state, score)| if score > best.1 { (state, score) } else { best })
-}
+/// Steps of which choices are kept in one word.
+const WORD: usize = LANES / 2;
 
-/// Where paths to each state come from, of one row: of up to four states in two bits each.
-trait Origins: PerState {
-    /// What it is written in.
-    type Word: Copy + Default + Send + Sync;
-
-    /// Words of a row.
-    fn words(states: usize) -> usize;
-
-    /// Writes into words of zeros that the best path to state `to` comes from state `from`.
-    fn put(words: &mut [Self::Word], to: usize, from: u32);
-
-    /// Where the best path to state `to` comes from.
-    fn get(words: &[Self::Word], to: usize) -> usize;
-}
-
-impl<const N: usize> Origins for [f64; N] {
-    type Word = u8;
-
-    fn words(_: usize) -> usize {
-        const { assert!(N <= 4) };
-        1
-    }
-
-    #[inline(always)]
-    fn put(words: &mut [u8], to: usize, from: u32) {
-        words[0] |= (from as u8) << (2 * to);
-    }
-
-    #[inline(always)]
-    fn get(words: &[u8], to: usize) -> usize {
-        usize::from(words[0] >> (2 * to) & 3)
-    }
-}
-
-impl Origins for Vec<f64> {
-    type Word = u32;
-
-    fn words(states: usize) -> usize {
-        states
-    }
-
-    fn put(words: &mut [u32], to: usize, from: u32) {
-        words[to] = from;
-    }
-
-    fn get(words: &[u32], to: usize) -> usize {
-        words[to] as usize
-    }
-}
-
-/// The best path to each state of the row after the last that was come by, one way.
-struct Ways<S: Origins> {
+/// The best path to each state of the row after the last that was come by, from each end.
+struct Ways<'a, S> {
+    steps: Steps<'a>,
     scores: Scores<S>,
-    /// Of each row in the order in which they were come by, for each state of the next.
-    origins: Vec<S::Word>,
-    words: usize,
+    /// Of each state of a step after the first, whether the best path comes from that state, of those up to it: a bit a step,
+    /// `[word][to][from - 1]`, the last step in the lowest.
+    choices: Vec<u64x2>,
 }
 
 /// Logarithms of the density of the rows so far along the best path to each state of the last row, and to each of the next.
@@ -147,60 +113,82 @@ struct Scores<S> {
     next: S,
 }
 
-impl<S: Origins> Ways<S> {
-    fn of<W: Way>(model: &HiddenMarkov, series: Observations) -> Self {
-        let Chain { begin, transition, .. } = Chain::<W>::of(model);
-        let logarithms = |of: Vec<f64>| of.into_iter().map(f64::ln).collect::<Vec<f64>>();
-        let (begin, transition, words) = (logarithms(begin), logarithms(transition), S::words(model.states()));
-        let scores = Scores { best: S::of(&begin), next: S::of(&begin) };
-        let mut ways = Self { scores, origins: vec![S::Word::default(); words * series.len()], words };
-        let mut known = 0;
-        each_block::<W>(model, Evaluated::Logarithms, series, |block| {
-            choose::<S, W>(block, &transition, &mut ways.scores, &mut ways.origins[known..]);
-            known += words * block.rows.len();
+impl<'a, S: PerState<Of = f64x2>> Ways<'a, S> {
+    fn of(model: &HiddenMarkov, series: Observations<'a>) -> Self {
+        let Chain { begin, transition, .. } = Chain::<f64x2>::of(model);
+        let logarithms =
+            |of: Vec<f64x2>| of.into_iter().map(|both| f64x2::each(|end| both.at(end).ln())).collect::<Vec<_>>();
+        let (states, begin, transition) = (begin.len(), logarithms(begin), logarithms(transition));
+        let steps = Steps::of::<f64x2>(series);
+        let begin = S::of(states, |state| begin[state]);
+        let mut scores = Scores { best: begin.clone(), next: begin };
+        let words = states * (states - 1);
+        let mut choices = vec![u64x2::ZERO; words * steps.count.div_ceil(WORD)];
+        each_block(model, Evaluated::Logarithms, steps, |block| {
+            let choices = &mut choices[block.from / WORD * words..][..words];
+            choose(&block, &transition, steps.uneven(), &mut scores, choices);
         });
-        ways
+        Self { steps, scores, choices }
     }
 
-    /// State of the last row that was come by on the best path to state `to` of the next.
-    fn next_of(&self, to: usize) -> usize {
-        self.origins.rchunks_exact(self.words).next().map_or(to, |words| S::get(words, to))
-    }
-
-    /// Writes the path that ends in `state` of the last row that was come by, from there back.
-    fn trace<'a>(&self, mut state: usize, mut places: impl Iterator<Item = &'a mut usize>) {
-        let Some(place) = places.next() else { return };
-        *place = state;
-        for (place, words) in places.zip(self.origins.rchunks_exact(self.words).skip(1)) {
-            state = S::get(words, state);
-            *place = state;
+    /// Shows `write` which state each of the first `to` steps from an end is in, the last steps first, where the best path goes on to
+    /// `state`.
+    fn trace(&self, end: usize, mut state: usize, mut to: usize, mut write: impl FnMut(Range<usize>, usize)) {
+        let others = self.scores.best.as_ref().len() - 1;
+        while to > 0 {
+            let first = (to - 1) / WORD * WORD;
+            // The lowest bit is that of the word's last step.
+            let bit = (first + WORD).min(self.steps.count) - to;
+            let choices = &self.choices[(first / WORD * (others + 1) + state) * others..][..others];
+            let chosen = |from: usize| choices[from - 1].as_array_ref()[end] >> bit;
+            let later = (state + 1..=others).fold(0, |bits, from| bits | chosen(from));
+            let stays = if state == 0 { !later } else { chosen(state) & !later };
+            let stayed = (stays.trailing_ones() as usize).min(to - first);
+            write(to - stayed..to, state);
+            to -= stayed;
+            if to > first {
+                let came = |from: &usize| chosen(*from) >> stayed & 1 == 1;
+                state = (1..=others).rev().find(came).unwrap_or(0);
+                write(to - 1..to, state);
+                to -= 1;
+            }
         }
     }
 }
 
 /// Goes on over a block, and writes where paths come from. A function of its own, so that scores stay in registers.
 #[inline(never)]
-fn choose<S: Origins, W: Way>(block: &Block, transition: &[f64], scores: &mut Scores<S>, origins: &mut [S::Word]) {
+fn choose<S: PerState<Of = f64x2>>(
+    block: &Block<f64x2>,
+    transition: &[f64x2],
+    uneven: bool,
+    scores: &mut Scores<S>,
+    choices: &mut [u64x2],
+) {
     let Scores { mut best, mut next } = scores.clone();
-    let states = best.as_ref().len();
-    let transition = &transition[..states * states];
-    let mut rows = origins.chunks_exact_mut(S::words(states));
-    block.each_row::<S, W>(|_, density| {
-        let Some(origin) = rows.next() else { return };
+    block.each_step::<S>(|step, densities| {
         let (best, next) = (best.as_mut(), next.as_mut());
-        for ((best, before), density) in best.iter_mut().zip(&*next).zip(density.as_ref()) {
-            *best = before + density;
+        let states = best.len();
+        let transition = &transition[..states * states];
+        let choices = &mut choices[..states * (states - 1)];
+        for ((best, before), density) in best.iter_mut().zip(&*next).zip(densities.as_ref()) {
+            *best = *before + *density;
         }
         for to in 0..states {
-            let (mut from, mut score) = (0, best[0] + transition[to]);
-            for state in 1..states {
-                let candidate = best[state] + transition[state * states + to];
-                // Two choices, and no branch.
-                from = if candidate > score { state as u32 } else { from };
-                score = if candidate > score { candidate } else { score };
+            let mut score = best[0] + transition[to];
+            for from in 1..states {
+                let candidate = best[from] + transition[from * states + to];
+                // All bits of what is better are set, which is -1.
+                let better: u64x2 = bytemuck::cast(candidate.cmp_gt(score));
+                let bits = &mut choices[to * (states - 1) + from - 1];
+                *bits = *bits + *bits - better;
+                score = candidate.fast_max(score);
             }
-            S::put(origin, to, from);
             next[to] = score;
+        }
+        if uneven && step == 0 {
+            // Of a row behind the series nothing is expected.
+            next.iter_mut().for_each(|score| *score = score.with(1, 0.0));
         }
     });
     *scores = Scores { best, next };

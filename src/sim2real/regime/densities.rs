@@ -3,20 +3,14 @@
 use nalgebra::DMatrix;
 use pulp::{Arch, NullaryFnOnce};
 use statrs::function::gamma::ln_gamma;
+use wide::f64x2;
 
-use super::chain::Way;
-use super::course::PerState;
-use super::{Emission, HiddenMarkov, Observations, RegimeError, Spread};
+use super::ends::{Ends, LANES, PerState, Steps};
+use super::{Emission, HiddenMarkov, RegimeError, Spread};
 use crate::sim2real::elementary::{exp, ln_1p};
 
 /// Squared distances are cut here, so that a density is never 0 in all states at once.
 const FARTHEST: f64 = 1e300;
-
-/// Rows that are evaluated side by side.
-const LANES: usize = 64;
-
-/// Rows of a block: what is known of them stays in the nearest memory until it is used.
-const BLOCK: usize = 4 * LANES;
 
 /// The densities of all states: arrays over states, nothing allocated when one is evaluated.
 #[derive(Debug, Clone, PartialEq)]
@@ -207,73 +201,45 @@ pub(super) enum Evaluated {
     Weights,
 }
 
-/// A stretch of a series, and what is evaluated of its rows.
-pub(super) struct Block<'a> {
-    pub model: &'a HiddenMarkov,
-    pub rows: Observations<'a>,
-    /// `[group of rows][state][row]`.
-    values: &'a [[f64; LANES]],
+/// Some steps into a series, and what is evaluated of their rows.
+pub(super) struct Block<'a, X: Ends> {
+    /// The first of them.
+    pub from: usize,
+    /// Number of steps.
+    pub count: usize,
+    /// `[state][step]`.
+    values: &'a [X::Group],
 }
 
-impl Block<'_> {
-    /// Shows `see` each row, in the order of the way, with what is evaluated of it in each state.
+impl<X: Ends> Block<'_, X> {
+    /// Shows `see` each step with what is evaluated of its rows in each state.
     #[inline(always)]
-    pub fn each_row<S: PerState, W: Way>(&self, mut see: impl FnMut(&[f64], &mut S)) {
-        let mut of_row = S::of(self.model.initial());
-        let states = of_row.as_ref().len();
-        let groups = self.rows.len().div_ceil(LANES);
-        for k in 0..groups {
-            let group = if W::BACK { groups - 1 - k } else { k };
-            let rows = self.rows.slice(group * LANES, (group + 1) * LANES);
-            let values = &self.values[group * states..][..states];
-            if W::BACK {
-                each_of(rows.iter().enumerate().rev(), values, &mut of_row, &mut see);
-            } else {
-                each_of(rows.iter().enumerate(), values, &mut of_row, &mut see);
-            }
+    pub fn each_step<S: PerState<Of = X>>(&self, mut see: impl FnMut(usize, &mut S)) {
+        for lane in 0..self.count {
+            let mut values = S::of(self.values.len(), |state| self.values[state].as_ref()[lane % (LANES / X::COUNT)]);
+            see(self.from + lane, &mut values);
         }
     }
 }
 
-/// Shows `see` the rows of a group.
-#[inline(always)]
-fn each_of<'a, S: PerState>(
-    rows: impl Iterator<Item = (usize, &'a [f64])>,
-    values: &[[f64; LANES]],
-    of_row: &mut S,
-    see: &mut impl FnMut(&[f64], &mut S),
-) {
-    for (lane, row) in rows {
-        for (value, rows) in of_row.as_mut().iter_mut().zip(values) {
-            *value = rows[lane % LANES];
-        }
-        see(row, of_row);
-    }
-}
-
-/// Evaluates a series block by block in the order of the way, each with the widest vectors of the processor: bit by bit what is evaluated
-/// of each row by itself.
-pub(super) fn each_block<'a, W: Way>(
-    model: &'a HiddenMarkov,
-    evaluated: Evaluated,
-    series: Observations<'a>,
-    mut see: impl FnMut(&Block),
-) {
-    let groups = BLOCK.min(series.len()).div_ceil(LANES);
-    let mut values = vec![[0.0; LANES]; groups * model.states()];
-    let blocks = series.len().div_ceil(BLOCK);
-    for k in 0..blocks {
-        let from = BLOCK * if W::BACK { blocks - 1 - k } else { k };
-        let rows = series.slice(from, from + BLOCK);
-        Arch::new().dispatch(Evaluation { densities: model.densities(), evaluated, rows, into: &mut values });
-        see(&Block { model, rows, values: &values });
+/// Evaluates a series block by block, each with the widest vectors of the processor: bit by bit what is evaluated of each row by itself.
+pub(super) fn each_block<X: Ends>(model: &HiddenMarkov, evaluated: Evaluated, steps: Steps, mut see: impl FnMut(Block<X>)) {
+    let (densities, size) = (model.densities(), LANES / X::COUNT);
+    let mut columns = vec![[0.0; LANES]; densities.width];
+    // Of the kind that needs the widest places.
+    let mut values = vec![f64x2::ZERO; model.states() * LANES / 2];
+    for from in (0..steps.count).step_by(size) {
+        steps.columns::<X>(from, &mut columns);
+        let into = bytemuck::cast_slice_mut(&mut values);
+        Arch::new().dispatch(Evaluation { densities, evaluated, columns: &columns, into });
+        see(Block { from, count: size.min(steps.count - from), values: bytemuck::cast_slice(&values) });
     }
 }
 
 struct Evaluation<'a> {
     densities: &'a Densities,
     evaluated: Evaluated,
-    rows: Observations<'a>,
+    columns: &'a [[f64; LANES]],
     into: &'a mut [[f64; LANES]],
 }
 
@@ -283,25 +249,12 @@ impl NullaryFnOnce for Evaluation<'_> {
     // What is not inlined here is compiled without the processor's vectors.
     #[inline(always)]
     fn call(self) {
-        let Self { densities, evaluated, rows, into } = self;
-        let mut columns = vec![[0.0; LANES]; densities.width];
-        for (group, into) in into.chunks_exact_mut(densities.peaks.len()).enumerate() {
-            let part = rows.slice(group * LANES, (group + 1) * LANES);
-            if let [column] = columns.as_mut_slice() {
-                column[..part.len()].copy_from_slice(part.values());
-            } else {
-                for (lane, row) in part.iter().enumerate() {
-                    for (column, value) in columns.iter_mut().zip(row) {
-                        column[lane % LANES] = *value;
-                    }
-                }
-            }
-            match evaluated {
-                Evaluated::Logarithms => densities.evaluate(&columns, 0.0, into),
-                Evaluated::Weights => {
-                    densities.evaluate(&columns, densities.highest, into);
-                    into.as_flattened_mut().iter_mut().for_each(|value| *value = exp(*value));
-                }
+        let Self { densities, evaluated, columns, into } = self;
+        match evaluated {
+            Evaluated::Logarithms => densities.evaluate(columns, 0.0, into),
+            Evaluated::Weights => {
+                densities.evaluate(columns, densities.highest, into);
+                into.as_flattened_mut().iter_mut().for_each(|value| *value = exp(*value));
             }
         }
     }

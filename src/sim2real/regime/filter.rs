@@ -1,8 +1,10 @@
 //! The probability of each state given what is known by now, one observation at a time.
 
 use super::course::Course;
+use super::ends::PerState;
+use super::observations::is_lost;
 use super::trellis::follow;
-use super::{HiddenMarkov, Observations, RegimeError};
+use super::{HiddenMarkov, Observations, RegimeError, in_logs};
 
 /// A model that follows a series as it comes. After each row it holds the probability of each state given all rows up to
 /// this one, and nothing that comes later changes what it said: bit by bit the rows of [`HiddenMarkov::filter`].
@@ -11,18 +13,35 @@ use super::{HiddenMarkov, Observations, RegimeError};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
     model: HiddenMarkov,
-    course: Course<Vec<f64>>,
+    course: Kind,
     belief: Vec<f64>,
-    weights: Vec<f64>,
     rows: u64,
+    observed: u64,
+}
+
+/// Where the recursion is: of a few states it is compiled for each number of them.
+#[derive(Debug, Clone, PartialEq)]
+enum Kind {
+    Two(Course<[f64; 2]>),
+    Three(Course<[f64; 3]>),
+    Four(Course<[f64; 4]>),
+    Many(Course<Vec<f64>>),
+    InLogs(in_logs::Course),
 }
 
 impl Filter {
     /// Before the first row.
     #[must_use]
     pub fn new(model: HiddenMarkov) -> Self {
-        let (belief, weights) = (model.initial().to_vec(), vec![0.0; model.states()]);
-        Self { course: Course::new(&model, model.initial()), belief, weights, rows: 0, model }
+        let belief = model.initial().to_vec();
+        let course = match model.states() {
+            _ if !model.mixes() => Kind::InLogs(in_logs::Course::new(&model)),
+            2 => Kind::Two(Course::new(&belief)),
+            3 => Kind::Three(Course::new(&belief)),
+            4 => Kind::Four(Course::new(&belief)),
+            _ => Kind::Many(Course::new(&belief)),
+        };
+        Self { course, belief, rows: 0, observed: 0, model }
     }
 
     /// Takes the next row, and gives the probability of each state.
@@ -35,14 +54,18 @@ impl Filter {
             return Err(self.refused(row));
         }
         self.rows += 1;
-        if !self.model.mixes() {
-            self.course.step_in_logs(&self.model, row, &mut self.belief, &mut self.weights);
-            self.course.believe(&mut self.belief);
-            return Ok(&self.belief);
+        self.observed += u64::from(!is_lost(row));
+        let Self { model, belief, .. } = self;
+        match &mut self.course {
+            Kind::Two(course) => take(course, model, row, belief),
+            Kind::Three(course) => take(course, model, row, belief),
+            Kind::Four(course) => take(course, model, row, belief),
+            Kind::Many(course) => take(course, model, row, belief),
+            Kind::InLogs(course) => {
+                course.step(model, row);
+                course.believe(belief);
+            }
         }
-        self.model.densities().weights(row, &mut self.weights);
-        self.course.step(&self.model, self.model.transition(), row, &mut self.weights);
-        self.course.believe(&mut self.belief);
         Ok(&self.belief)
     }
 
@@ -65,7 +88,14 @@ impl Filter {
     /// Logarithm of the density of all rows so far.
     #[must_use]
     pub fn log_likelihood(&self) -> f64 {
-        self.course.log_likelihood(&self.model)
+        let (model, observed) = (&self.model, self.observed);
+        match &self.course {
+            Kind::Two(course) => course.log_likelihood(model, observed),
+            Kind::Three(course) => course.log_likelihood(model, observed),
+            Kind::Four(course) => course.log_likelihood(model, observed),
+            Kind::Many(course) => course.log_likelihood(model, observed),
+            Kind::InLogs(course) => course.log_likelihood(model, observed),
+        }
     }
 
     /// Number of rows so far.
@@ -79,6 +109,15 @@ impl Filter {
     pub fn model(&self) -> &HiddenMarkov {
         &self.model
     }
+}
+
+/// Takes a row, and writes what is believed then.
+#[inline]
+fn take<S: PerState<Of = f64>>(course: &mut Course<S>, model: &HiddenMarkov, row: &[f64], belief: &mut [f64]) {
+    let mut weights = S::of(model.states(), |_| 0.0);
+    model.densities().weights(row, weights.as_mut());
+    course.step(model, model.transition(), &mut weights, |_| Some(row));
+    course.believe(belief);
 }
 
 impl HiddenMarkov {

@@ -11,13 +11,13 @@
 //! What has a `step` is online: what it said of a row, no later row changes by a bit. All else looks at a series from its end.
 
 mod baum_welch;
-mod chain;
 mod course;
 mod cusum;
 mod decode;
 mod densities;
 mod drift;
 mod emission;
+mod ends;
 mod error;
 mod filter;
 mod hazard;

@@ -79,14 +79,13 @@ impl<'a> Observations<'a> {
         Self { values: &self.values[from.min(to) * self.width..to * self.width], width: self.width }
     }
 
-    /// The first `middle` rows, and the others.
-    pub(super) fn split(&self, middle: usize) -> (Self, Self) {
-        (self.slice(0, middle), self.slice(middle, self.len()))
-    }
-
     /// Number of rows that were not lost.
     #[must_use]
     pub fn observed(&self) -> usize {
+        // Of one column several values at once.
+        if self.width == 1 {
+            return self.values.iter().map(|x| usize::from(!x.is_nan())).sum();
+        }
         self.iter().filter(|row| !is_lost(row)).count()
     }
 }

@@ -1,6 +1,7 @@
 //! Where a fit begins: guesses of which rows are of which state.
 
 use rand::RngExt;
+use wide::f64x2;
 
 use super::moments::Moments;
 use super::observations::is_lost;
@@ -157,7 +158,7 @@ fn model(series: &[Observations], labels: &[usize], settings: &Settings, varianc
     let means = group_means(series, labels, states);
     let mut moments = Moments::new(means, variances.len(), settings.family);
     let mut label = labels.iter();
-    let mut one = vec![0.0; states];
+    let mut one = vec![f64x2::ZERO; states];
     for part in series {
         let mut before = None;
         for row in part.iter() {
@@ -170,9 +171,9 @@ fn model(series: &[Observations], labels: &[usize], settings: &Settings, varianc
                 let row: &mut Vec<f64> = &mut counts[before];
                 row[now] += 1.0;
             }
-            one.fill(0.0);
-            one[now] = 1.0;
-            moments.add(row, &one, None);
+            one.fill(f64x2::ZERO);
+            one[now] = f64x2::from([1.0, 0.0]);
+            moments.add([Some(row), None], &one, None);
         }
     }
     // A start must leave every state some width to grow from.

@@ -1,12 +1,17 @@
 //! The recursions over a whole series: from its ends to where they meet, and on over what was found there.
 
-use super::chain::{Back, Chain, LONG, LONGER, Onward, Way, middle};
-use super::course::{Course, LARGEST, PerState};
+use wide::f64x2;
+
+use super::course::{Course, LARGEST, Meeting};
 use super::densities::{Block, Evaluated, each_block};
+use super::ends::{Chain, Ends, PerState, Steps};
 use super::{HiddenMarkov, Observations, in_logs};
 
 /// Runs from the first row on and shows each row's belief: what is found of a row rests on no later one.
 pub(super) fn follow(model: &HiddenMarkov, series: Observations, see: impl FnMut(&[f64])) {
+    if !model.mixes() {
+        return in_logs::follow(model, series, see);
+    }
     match model.states() {
         2 => follow_of::<[f64; 2]>(model, series, see),
         3 => follow_of::<[f64; 3]>(model, series, see),
@@ -16,100 +21,73 @@ pub(super) fn follow(model: &HiddenMarkov, series: Observations, see: impl FnMut
 }
 
 #[inline(always)]
-fn follow_of<S: PerState>(model: &HiddenMarkov, series: Observations, mut see: impl FnMut(&[f64])) {
-    let mut belief = S::of(model.initial());
-    if model.mixes() {
-        run::<S, Onward>(&Chain::of(model), series, |course, _, _| {
-            course.believe(belief.as_mut());
-            see(belief.as_ref());
-        });
-    } else {
-        run_in_logs::<S>(model, series, |course, _, _| {
-            course.believe(belief.as_mut());
-            see(belief.as_ref());
-        });
-    }
-}
-
-/// Where a series is cut in two halves, of which the second is taken from its end; `None` where it is taken whole.
-fn cut(model: &HiddenMarkov, series: Observations, long: usize) -> Option<usize> {
-    if model.mixes() { middle(series.len(), long) } else { None }
+fn follow_of<S: PerState<Of = f64>>(model: &HiddenMarkov, series: Observations, mut see: impl FnMut(&[f64])) {
+    let mut belief = S::of(model.states(), |_| 0.0);
+    run::<S>(model, series, |_, course, _, _| {
+        course.believe(belief.as_mut());
+        see(belief.as_ref());
+    });
 }
 
 /// Logarithm of the density of a series.
 pub(super) fn log_likelihood(model: &HiddenMarkov, series: Observations) -> f64 {
-    match model.states() {
-        2 => log_likelihood_of::<[f64; 2]>(model, series),
-        3 => log_likelihood_of::<[f64; 3]>(model, series),
-        4 => log_likelihood_of::<[f64; 4]>(model, series),
-        _ => log_likelihood_of::<Vec<f64>>(model, series),
+    let meeting = match model.states() {
+        _ if !model.mixes() => None,
+        2 => met::<[f64x2; 2]>(model, series),
+        3 => met::<[f64x2; 3]>(model, series),
+        4 => met::<[f64x2; 4]>(model, series),
+        _ => met::<Vec<f64x2>>(model, series),
+    };
+    match meeting {
+        Some(meeting) => meeting.log_likelihood,
+        None => in_logs::log_likelihood(model, series),
     }
 }
 
-fn log_likelihood_of<S: PerState>(model: &HiddenMarkov, series: Observations) -> f64 {
-    if !model.mixes() {
-        return run_in_logs::<S>(model, series, |_, _, _| ()).log_likelihood(model);
-    }
-    let onward = |rows| run::<S, Onward>(&Chain::of(model), rows, |_, _, _| ());
-    let back = |rows| run::<S, Back>(&Chain::of(model), rows, |_, _, _| ());
-    if let Some(middle) = cut(model, series, LONGER) {
-        let (first, last) = series.split(middle);
-        let (first, last) = rayon::join(|| onward(first), || back(last));
-        if let Some(meeting) = first.meet(&last, model) {
-            return meeting.log_likelihood;
-        }
-    }
-    onward(series).log_likelihood(model)
+fn met<S: PerState<Of = f64x2>>(model: &HiddenMarkov, series: Observations) -> Option<Meeting> {
+    run::<S>(model, series, |_, _, _, _| ()).meet(model, series.observed())
 }
 
-/// Runs over a series; `see` is shown where the recursion is after each row, the row's weights, and what makes ratios of them.
+/// Runs over a series; `see` is shown each step, where the recursion is then, the step's weights, and what makes ratios of them.
 #[inline(always)]
-fn run<S: PerState, W: Way>(chain: &Chain<W>, series: Observations, mut see: impl FnMut(&Course<S>, &S, f64)) -> Course<S> {
-    let mut course = Course::new(chain.model, &chain.begin);
-    each_block::<W>(chain.model, Evaluated::Weights, series, |block| advance(block, chain, &mut course, &mut see));
-    course
-}
-
-/// Runs over a series of a model that does not mix, from the first row on; `see` is shown where the recursion is after each row, and
-/// logarithms of what is believed of it and of its ratios.
-fn run_in_logs<S: PerState>(
+fn run<S: PerState>(
     model: &HiddenMarkov,
     series: Observations,
-    mut see: impl FnMut(&Course<S>, &[f64], &[f64]),
+    mut see: impl FnMut(usize, &Course<S>, &S, S::Of),
 ) -> Course<S> {
-    let mut course = Course::<S>::new(model, model.initial());
-    let (mut beliefs, mut ratios) = (vec![0.0; model.states()], vec![0.0; model.states()]);
-    for row in series.iter() {
-        course.step_in_logs(model, row, &mut beliefs, &mut ratios);
-        see(&course, &beliefs, &ratios);
-    }
+    let (chain, steps) = (Chain::of(model), Steps::of::<S::Of>(series));
+    let mut course = Course::new(&chain.begin);
+    each_block(model, Evaluated::Weights, steps, |block| advance(&block, steps, &chain, &mut course, &mut see));
     course
 }
 
 /// Goes on over a block. A function of its own, so that where the recursion is stays in registers.
 #[inline(never)]
-fn advance<S: PerState, W: Way>(
-    block: &Block,
-    chain: &Chain<W>,
+fn advance<S: PerState>(
+    block: &Block<S::Of>,
+    steps: Steps,
+    chain: &Chain<S::Of>,
     from: &mut Course<S>,
-    mut see: impl FnMut(&Course<S>, &S, f64),
+    mut see: impl FnMut(usize, &Course<S>, &S, S::Of),
 ) {
     let mut course = from.clone();
-    block.each_row::<S, W>(|row, weights| {
-        let inverse = course.step(block.model, &chain.transition, row, weights);
-        see(&course, weights, inverse);
+    block.each_step::<S>(|step, weights| {
+        let inverse = course.step(chain.model, &chain.transition, weights, |end| steps.row(step, end));
+        see(step, &course, weights, inverse);
     });
     *from = course;
 }
 
-/// What is known of a row where the second recursion over its half comes by. Of the half from the last row back, everything is as seen
-/// from there: the row before a row is the one that follows it.
+/// What is known of a step's rows where the second recursion comes by, side by side. Of the half from the last row back, everything is as
+/// seen from there: the row before a row is the one that follows it.
 pub(super) struct Seen<'a> {
-    /// Its number in the series.
-    pub row: usize,
+    /// The step.
+    pub step: usize,
+    /// Number of ends: of what was taken from one end only, numbers of the other are 0.
+    pub ends: usize,
     /// Probability of each state given the whole series.
-    pub posterior: &'a [f64],
-    /// Transitions into it from the row before.
+    pub posterior: &'a [f64x2],
+    /// Transitions into them from the rows before.
     pub arrivals: Arrivals<'a>,
 }
 
@@ -119,31 +97,30 @@ pub(super) enum Arrivals<'a> {
     None,
     /// The products of what was believed `before` and, for each state, how much more likely the row and all that follow are than they were
     /// given all before.
-    Products { before: &'a [f64], ahead: &'a [f64] },
-    /// `[from][to]`.
+    Products { before: &'a [f64x2], ahead: &'a [f64x2] },
+    /// `[from][to]`, of the first end.
     Each(&'a [f64]),
 }
 
-/// Who is shown the rows by [`Trellis::backward`]: a trait, because its method can be told to be inlined.
-pub(super) trait Visit: Send {
-    /// Takes what is known of a row; what is written into `belief`, until now what was believed of it given the rows up to it, is kept.
-    fn visit(&mut self, seen: Seen, belief: &mut [f64]);
+/// Who is shown what is known by [`Trellis::backward`]: a trait, because its method can be told to be inlined.
+pub(super) trait Visit {
+    /// Takes what is known of a step's rows.
+    fn visit(&mut self, seen: Seen);
 }
 
-/// What the first recursions found, row after row: of the rows of the first half from the first row on, of the others from the last
-/// row back.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// What the first recursions found, step after step.
+#[derive(Debug, Clone, Default)]
 pub(super) struct Trellis {
-    states: usize,
-    /// Rows of the first half.
-    middle: usize,
-    /// Probability of each state given the rows up to this one, `[row][state]`.
-    pub beliefs: Vec<f64>,
-    /// Density of the row in each state over its density given all before, `[row][state]`.
-    ratios: Vec<f64>,
-    /// Where the second recursion over each half begins: for each state of its last row, how much more likely the other half is than it
-    /// was given this one.
-    begins: [Vec<f64>; 2],
+    /// Probability of each state given the rows up to this one, `[step][state]`.
+    beliefs: Vec<f64x2>,
+    /// Density of the row in each state over its density given all before, `[step][state]`.
+    ratios: Vec<f64x2>,
+    /// Of each half, for each state of its last row as it is come by, how much more likely the other half is than it was given this one.
+    beyond: Vec<f64x2>,
+    /// Whether the first row of the last half is behind the series.
+    uneven: bool,
+    /// What was found in logarithms, where the recursions do not meet.
+    in_logs: Option<in_logs::Trellis>,
     /// Expected number of transitions from the first half into the other, over their probability; none where there is no other.
     pub crossing: Vec<f64>,
     pub log_likelihood: f64,
@@ -152,119 +129,78 @@ pub(super) struct Trellis {
 impl Trellis {
     /// Runs from the ends of a series to where they meet; what was held before is overwritten, and its memory used again.
     pub fn forward(&mut self, model: &HiddenMarkov, series: Observations) {
-        self.states = model.states();
-        let size = series.len() * self.states;
-        self.beliefs.resize(size, 0.0);
-        self.ratios.resize(size, 0.0);
-        match self.states {
-            2 => self.forward_of::<[f64; 2]>(model, series),
-            3 => self.forward_of::<[f64; 3]>(model, series),
-            4 => self.forward_of::<[f64; 4]>(model, series),
-            _ => self.forward_of::<Vec<f64>>(model, series),
-        }
-    }
-
-    fn forward_of<S: PerState>(&mut self, model: &HiddenMarkov, series: Observations) {
-        if let Some(middle) = cut(model, series, LONG) {
-            self.middle = middle;
-            let ((first, last), (here, there)) = (series.split(middle), self.halves());
-            let (first, last) = rayon::join(|| here.fill::<S, Onward>(model, first), || there.fill::<S, Back>(model, last));
-            if let Some(meeting) = first.meet(&last, model) {
-                self.begins = [meeting.after_first(), meeting.before_last()];
-                self.crossing = meeting.crossing();
-                self.log_likelihood = meeting.log_likelihood;
-                return;
-            }
-        }
-        self.middle = series.len();
-        self.begins = [vec![1.0; self.states], vec![]];
-        self.crossing.clear();
-        if !model.mixes() {
-            let places = self.beliefs.chunks_exact_mut(self.states).zip(self.ratios.chunks_exact_mut(self.states));
-            self.log_likelihood = fill_in_logs::<S>(model, series, places).log_likelihood(model);
-            return;
-        }
-        self.log_likelihood = self.halves().0.fill::<S, Onward>(model, series).log_likelihood(model);
-    }
-
-    fn halves(&mut self) -> (Half<'_>, Half<'_>) {
-        let middle = self.middle * self.states;
-        let ((first, last), (ratios, last_ratios)) = (self.beliefs.split_at_mut(middle), self.ratios.split_at_mut(middle));
-        (Half { from: 0, beliefs: first, ratios }, Half { from: self.middle, beliefs: last, ratios: last_ratios })
-    }
-
-    /// Runs on from where the ends met, over what was found there, and shows `first` each row of the first half, the last first, and
-    /// `last` each row of the other, its first row first.
-    pub fn backward(&mut self, model: &HiddenMarkov, first: &mut impl Visit, last: &mut impl Visit) {
-        match self.states {
-            2 => self.backward_of::<[f64; 2]>(model, first, last),
-            3 => self.backward_of::<[f64; 3]>(model, first, last),
-            4 => self.backward_of::<[f64; 4]>(model, first, last),
-            _ => self.backward_of::<Vec<f64>>(model, first, last),
-        }
-    }
-
-    fn backward_of<S: PerState>(&mut self, model: &HiddenMarkov, first: &mut impl Visit, last: &mut impl Visit) {
-        if !model.mixes() {
-            in_logs::sweep(model, &mut self.beliefs, &self.ratios, first);
-            return;
-        }
-        let begins = std::mem::take(&mut self.begins);
-        let (here, there) = self.halves();
-        if there.beliefs.is_empty() {
-            here.sweep::<S, Onward>(model, &begins[0], first);
+        let met = match model.states() {
+            _ if !model.mixes() => None,
+            2 => self.forward_of::<[f64x2; 2]>(model, series),
+            3 => self.forward_of::<[f64x2; 3]>(model, series),
+            4 => self.forward_of::<[f64x2; 4]>(model, series),
+            _ => self.forward_of::<Vec<f64x2>>(model, series),
+        };
+        if let Some(Meeting { log_likelihood, beyond, crossing }) = met {
+            self.in_logs = None;
+            (self.log_likelihood, self.beyond) = (log_likelihood, beyond);
+            self.crossing = if series.len() > 1 { crossing } else { vec![] };
         } else {
-            rayon::join(
-                || here.sweep::<S, Onward>(model, &begins[0], first),
-                || there.sweep::<S, Back>(model, &begins[1], last),
-            );
+            let found = in_logs::Trellis::of(model, series);
+            self.log_likelihood = found.log_likelihood;
+            self.crossing.clear();
+            self.in_logs = Some(found);
         }
     }
-}
 
-/// The rows of a half.
-struct Half<'a> {
-    /// Number of its first row in the series.
-    from: usize,
-    beliefs: &'a mut [f64],
-    ratios: &'a mut [f64],
-}
+    fn forward_of<S: PerState<Of = f64x2>>(&mut self, model: &HiddenMarkov, series: Observations) -> Option<Meeting> {
+        let (states, steps) = (model.states(), Steps::of::<f64x2>(series));
+        self.beliefs.resize(steps.count * states, f64x2::ZERO);
+        self.ratios.resize(steps.count * states, f64x2::ZERO);
+        let mut places = self.beliefs.chunks_exact_mut(states).zip(self.ratios.chunks_exact_mut(states));
+        let course = run::<S>(model, series, |_, course, weights, inverse| {
+            let Some((belief, ratios)) = places.next() else { return };
+            for (ratio, weight) in ratios.iter_mut().zip(weights.as_ref()) {
+                *ratio = *weight * inverse;
+            }
+            course.believe(belief);
+        });
+        self.uneven = steps.uneven();
+        if self.uneven {
+            // Nothing came from a row that is not there.
+            self.beliefs.iter_mut().take(states).for_each(|belief| *belief = belief.with(1, 0.0));
+        }
+        course.meet(model, series.observed())
+    }
 
-impl Half<'_> {
-    /// The first recursion.
-    fn fill<S: PerState, W: Way>(self, model: &HiddenMarkov, rows: Observations) -> Course<S> {
-        let states = model.states();
-        let places = self.beliefs.chunks_exact_mut(states).zip(self.ratios.chunks_exact_mut(states));
-        if W::BACK { fill::<S, W>(model, rows, places.rev()) } else { fill::<S, W>(model, rows, places) }
+    /// Runs on from where the ends met to the ends, over what was found there, and shows `visitor` each step, the last first.
+    pub fn backward(&self, model: &HiddenMarkov, visitor: &mut impl Visit) {
+        match model.states() {
+            _ if self.in_logs.is_some() => self.in_logs.iter().for_each(|found| found.sweep(model, visitor)),
+            2 => self.sweep::<[f64x2; 2]>(model, visitor),
+            3 => self.sweep::<[f64x2; 3]>(model, visitor),
+            4 => self.sweep::<[f64x2; 4]>(model, visitor),
+            _ => self.sweep::<Vec<f64x2>>(model, visitor),
+        }
     }
 
     /// The second recursion, against the first.
     #[inline(always)]
-    fn sweep<S: PerState, W: Way>(self, model: &HiddenMarkov, begin: &[f64], visitor: &mut impl Visit) {
-        let Self { from, beliefs, ratios } = self;
-        let chain = Chain::<W>::of(model);
-        let (mut beta, mut posterior, mut ahead) = (S::of(begin), S::of(begin), S::of(begin));
+    fn sweep<S: PerState<Of = f64x2>>(&self, model: &HiddenMarkov, visitor: &mut impl Visit) {
+        let Chain { transition, begin, .. } = Chain::<f64x2>::of(model);
+        let states = begin.len();
+        let mut beta = S::of(states, |state| self.beyond[state]);
+        let (mut posterior, mut ahead) = (beta.clone(), beta.clone());
         let (beta, posterior, ahead) = (beta.as_mut(), posterior.as_mut(), ahead.as_mut());
-        let states = beta.len();
-        let transition = &chain.transition[..states * states];
-        let rows = ratios.len() / states;
-        for k in (0..rows).rev() {
-            let row = if W::BACK { rows - 1 - k } else { k };
-            let ratio = &ratios[row * states..][..states];
-            // The beliefs of the row, and of the one that came before it.
-            let (low, high) = beliefs.split_at_mut((row + usize::from(W::BACK)) * states);
-            let (belief, before) = if W::BACK {
-                (&mut low[row * states..], high.get(..states))
-            } else {
-                (&mut high[..states], low.len().checked_sub(states).map(|from| &low[from..]))
-            };
-            let mut sum = 0.0;
+        let (states, transition) = (beta.len(), &transition[..beta.len() * beta.len()]);
+        for step in (0..self.ratios.len() / states).rev() {
+            let (belief, ratio) = (&self.beliefs[step * states..][..states], &self.ratios[step * states..][..states]);
+            let before = step.checked_sub(1).map(|before| &self.beliefs[before * states..][..states]);
+            let mut sum = f64x2::ZERO;
             for state in 0..states {
                 posterior[state] = belief[state] * beta[state];
                 ahead[state] = ratio[state] * beta[state];
                 sum += posterior[state];
             }
-            let inverse = 1.0 / sum;
+            if self.uneven && step == 0 {
+                sum = sum.with(1, 1.0);
+            }
+            let inverse = f64x2::ONE / sum;
             for probability in posterior.iter_mut() {
                 *probability *= inverse;
             }
@@ -272,43 +208,14 @@ impl Half<'_> {
                 Some(before) => Arrivals::Products { before, ahead },
                 None => Arrivals::None,
             };
-            visitor.visit(Seen { row: from + row, posterior, arrivals }, belief);
+            visitor.visit(Seen { step, ends: 2, posterior, arrivals });
             for from in 0..states {
                 let mut product = transition[from * states] * ahead[0];
                 for to in 1..states {
                     product += transition[from * states + to] * ahead[to];
                 }
-                beta[from] = if product < LARGEST { product } else { LARGEST };
+                beta[from] = product.at_most(LARGEST);
             }
         }
     }
-}
-
-/// Fills places, in the order of the way.
-#[inline(always)]
-fn fill<'a, S: PerState, W: Way>(
-    model: &HiddenMarkov,
-    rows: Observations,
-    mut places: impl Iterator<Item = (&'a mut [f64], &'a mut [f64])>,
-) -> Course<S> {
-    run::<S, W>(&Chain::of(model), rows, |course, weights, inverse| {
-        let Some((belief, ratios)) = places.next() else { return };
-        for (ratio, weight) in ratios.iter_mut().zip(weights.as_ref()) {
-            *ratio = weight * inverse;
-        }
-        course.believe(belief);
-    })
-}
-
-/// Fills places with logarithms, of a model that does not mix.
-fn fill_in_logs<'a, S: PerState>(
-    model: &HiddenMarkov,
-    rows: Observations,
-    mut places: impl Iterator<Item = (&'a mut [f64], &'a mut [f64])>,
-) -> Course<S> {
-    run_in_logs::<S>(model, rows, |_, beliefs, ratios| {
-        let Some((belief, ratio)) = places.next() else { return };
-        belief.copy_from_slice(beliefs);
-        ratio.copy_from_slice(ratios);
-    })
 }
