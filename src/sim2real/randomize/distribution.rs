@@ -318,8 +318,7 @@ impl Inverse {
     pub fn at(&self, u: f64) -> f64 {
         match self {
             Self::Constant(value) => *value,
-            // Rounding may not lead beyond the ends.
-            Self::Uniform { low, high } => (low + u * (high - low)).clamp(*low, *high),
+            Self::Uniform { low, high } => uniform_at(u, *low, *high),
             Self::LogUniform { low, high, from, width } => (from + u * width).exp().clamp(*low, *high),
             Self::Normal { mean, std } => mean + std * normal_quantile(u),
             Self::TruncatedNormal { mean, std, low, high, below, within, above } => {
@@ -337,19 +336,41 @@ impl Inverse {
         }
     }
 
+    /// Whether the copula's normal numbers make values as they are, where others take the parts that lie below them.
+    pub fn takes_normal(&self) -> bool {
+        match self {
+            Self::Normal { .. } | Self::LogNormal { .. } => true,
+            // Nothing is cut off.
+            Self::TruncatedNormal { within, .. } => *within >= 1.0,
+            _ => false,
+        }
+    }
+
     /// The value of which the copula says `z`, a standard normal number.
     #[inline]
     pub fn at_normal(&self, z: f64) -> f64 {
         match self {
             Self::Normal { mean, std } => mean + std * z,
             Self::LogNormal { mean, sigma } => (mean + sigma * z).exp(),
-            // Nothing is cut off.
-            Self::TruncatedNormal { mean, std, low, high, within, .. } if *within >= 1.0 => {
-                (mean + std * z).clamp(*low, *high)
-            }
-            other => other.at(normal_cdf(z).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)),
+            Self::TruncatedNormal { mean, std, low, high, .. } if self.takes_normal() => (mean + std * z).clamp(*low, *high),
+            other => other.at(open(normal_cdf(z))),
         }
     }
+}
+
+/// The value between two ends below which a part `u` lies. Rounding may not lead beyond the ends; `clamp` would ask of every number
+/// whether they are in order.
+#[inline(always)]
+pub(super) fn uniform_at(u: f64, low: f64, high: f64) -> f64 {
+    let value = low + u * (high - low);
+    let value = if value < low { low } else { value };
+    if value > high { high } else { value }
+}
+
+/// `part`, which may be rounded to an end of (0, 1), where it is in it.
+#[inline(always)]
+pub(super) fn open(part: f64) -> f64 {
+    part.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)
 }
 
 #[cfg(test)]
