@@ -107,19 +107,43 @@ pub fn normal_quantile(u: f64) -> f64 {
 /// How many quantiles are found at once.
 pub(super) const AT_ONCE: usize = 64;
 
-/// Makes parts up to [`AT_ONCE`] their quantiles, bit by bit as one by one. First as if none were in a tail: compilers make vector
-/// instructions of that.
+/// Makes parts up to [`AT_ONCE`] their quantiles, bit by bit as one by one.
 pub(super) fn normal_quantiles(parts: &mut [f64]) {
-    let mut all = [0.0; AT_ONCE];
-    for (q, u) in all.iter_mut().zip(&*parts) {
-        *q = u - 0.5;
-    }
-    let mut quantiles = [0.0; AT_ONCE];
-    for k in 0..AT_ONCE {
-        quantiles[k] = centre(all[k]);
-    }
-    for ((part, q), z) in parts.iter_mut().zip(all).zip(quantiles) {
-        *part = if q.abs() <= REACH { z } else { tail(*part) };
+    Arch::new().dispatch(Quantiles(parts));
+}
+
+/// With the widest vectors of the processor, which compilers make of loops without branches: all are taken as if none were in a tail,
+/// and then those that are beside one another.
+struct Quantiles<'a>(&'a mut [f64]);
+
+impl NullaryFnOnce for Quantiles<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        // Parts in tails and where they are: what is in none is written over by the next.
+        let (mut places, mut tails, mut count) = ([0; AT_ONCE], [0.0; AT_ONCE], 0);
+        for (place, u) in self.0.iter().enumerate() {
+            (places[count], tails[count]) = (place, *u);
+            count += usize::from((u - 0.5).abs() > REACH);
+        }
+        for u in self.0.iter_mut() {
+            *u = centre(*u - 0.5);
+        }
+        let (places, tails) = (&places[..count], &tails[..count]);
+        let mut logarithms = [0.0; AT_ONCE];
+        for (logarithm, u) in logarithms.iter_mut().zip(tails) {
+            *logarithm = outer(*u).ln();
+        }
+        let mut sizes = [0.0; AT_ONCE];
+        for (size, logarithm) in sizes.iter_mut().zip(&logarithms[..count]) {
+            *size = near(depth(*logarithm));
+        }
+        for k in 0..count {
+            let depth = depth(logarithms[k]);
+            let size = if depth <= NEAR { sizes[k] } else { far(depth) };
+            self.0[places[k]] = size.copysign(tails[k] - 0.5);
+        }
     }
 }
 
@@ -132,9 +156,34 @@ fn centre(q: f64) -> f64 {
 }
 
 fn tail(u: f64) -> f64 {
-    let tail = (-u.min(1.0 - u).ln()).sqrt();
-    let size = if tail <= 5.0 { ratio(tail - 1.6, &TAIL) } else { ratio(tail - 5.0, &FAR_TAIL) };
+    let depth = depth(outer(u).ln());
+    let size = if depth <= NEAR { near(depth) } else { far(depth) };
     size.copysign(u - 0.5)
+}
+
+/// The part beyond, in whichever tail it is.
+#[inline(always)]
+fn outer(u: f64) -> f64 {
+    u.min(1.0 - u)
+}
+
+/// How deep in its tail a part of this logarithm is.
+#[inline(always)]
+fn depth(logarithm: f64) -> f64 {
+    (-logarithm).sqrt()
+}
+
+/// How deep the nearer part of a tail goes.
+const NEAR: f64 = 5.0;
+
+#[inline(always)]
+fn near(depth: f64) -> f64 {
+    ratio(depth - 1.6, &TAIL)
+}
+
+#[inline(always)]
+fn far(depth: f64) -> f64 {
+    ratio(depth - NEAR, &FAR_TAIL)
 }
 
 /// Coefficients of numerator and denominator, the constant first.
