@@ -98,7 +98,7 @@ impl Group {
     }
 
     /// Turns independent standard normal numbers, one a member, into correlated ones.
-    #[inline]
+    #[inline(always)]
     pub fn correlate<const N: usize>(&self, normal: &mut [[f64; N]]) {
         // From the last row on: each needs those before it as they were.
         let mut end = self.factor.len();

@@ -1,9 +1,11 @@
 //! Draws for many environments at once.
 
+use pulp::{Arch, NullaryFnOnce};
+
 use super::correlation::{Correlation, CorrelationError, Group, groups};
-use super::distribution::Inverse;
+use super::distribution::{Inverse, open, uniform_at};
 use super::level::Level;
-use super::normal::{AT_ONCE, normal_quantile, normal_quantiles};
+use super::normal::{AT_ONCE, normal_parts, normal_quantile, normal_quantiles};
 use super::stream::{DrawKey, Occasion, Streams, name_key, uniform};
 use super::{DrawTable, Implausible, Randomized, Redraw, Target};
 use crate::sim2real::Seed;
@@ -160,17 +162,7 @@ impl Randomizer {
             }
         }
         for group in self.drawn_groups(occasion) {
-            let mut normal = vec![[0.0; AT_ONCE]; group.members.len()];
-            for (part, keys) in keys.chunks(AT_ONCE).enumerate() {
-                for (z, k) in normal.iter_mut().zip(&group.members) {
-                    self.entries[*k].standard(keys, &mut z[..keys.len()]);
-                }
-                group.correlate(&mut normal);
-                for (k, z) in group.members.iter().zip(&normal) {
-                    let row = &mut table.row_mut(*k)[part * AT_ONCE..][..keys.len()];
-                    self.entries[*k].fill_by_normal(keys, &z[..keys.len()], row, level);
-                }
-            }
+            Arch::new().dispatch(Together { entries: &self.entries, group, keys: &keys, table, level });
         }
     }
 
@@ -202,7 +194,7 @@ impl Randomizer {
             let standard = |k: &usize| [normal_quantile(uniform(key, self.entries[*k].key))];
             let mut normal: Vec<[f64; 1]> = group.members.iter().map(standard).collect();
             group.correlate(&mut normal);
-            for (k, z) in group.members.iter().zip(&normal) {
+            for (k, z) in group.members.iter().zip(&mut normal) {
                 self.entries[*k].fill_by_normal(&[key], z, &mut table.row_mut(*k)[place..=place], level);
             }
         }
@@ -210,6 +202,36 @@ impl Randomizer {
 
     fn drawn_groups(&self, occasion: Occasion) -> impl Iterator<Item = &Group> {
         self.groups.iter().filter(move |group| self.entries[group.members[0]].part_in(occasion) == Part::Drawn)
+    }
+}
+
+/// Draws for the members of a group and the environments of `keys`, with the widest vectors of the processor: what is not inlined into it
+/// is compiled without.
+struct Together<'a> {
+    entries: &'a [Entry],
+    group: &'a Group,
+    keys: &'a [u64],
+    table: &'a mut DrawTable,
+    level: Level,
+}
+
+impl NullaryFnOnce for Together<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { entries, group, keys, table, level } = self;
+        let mut normal = vec![[0.0; AT_ONCE]; group.members.len()];
+        for (part, keys) in keys.chunks(AT_ONCE).enumerate() {
+            for (z, k) in normal.iter_mut().zip(&group.members) {
+                entries[*k].standard(keys, &mut z[..keys.len()]);
+            }
+            group.correlate(&mut normal);
+            for (k, z) in group.members.iter().zip(&mut normal) {
+                let row = &mut table.row_mut(*k)[part * AT_ONCE..][..keys.len()];
+                entries[*k].fill_by_normal(keys, &mut z[..keys.len()], row, level);
+            }
+        }
     }
 }
 
@@ -256,25 +278,19 @@ impl Entry {
 
     /// Draws for the environments of `keys`.
     fn fill(&self, keys: &[u64], row: &mut [f64], level: Level) {
-        // What is asked once a row need not be asked once a value.
-        match &self.inverse {
-            Inverse::Uniform { low, high } => {
-                let own = Inverse::Uniform { low: *low, high: *high };
-                self.fill_by(keys, row, level, |u| own.at(u));
-            }
-            Inverse::Normal { .. } | Inverse::LogNormal { .. } if keys.len() > 1 => {
-                let mut normal = [0.0; AT_ONCE];
-                for (row, keys) in row.chunks_mut(AT_ONCE).zip(keys.chunks(AT_ONCE)) {
-                    let normal = &mut normal[..keys.len()];
-                    self.standard(keys, normal);
-                    self.fill_by_normal(keys, normal, row, level);
-                }
-            }
-            other => self.fill_by(keys, row, level, |u| other.at(u)),
+        if keys.len() == 1 || !matches!(self.inverse, Inverse::Normal { .. } | Inverse::LogNormal { .. }) {
+            return self.fill_by_parts(keys, keys.iter().map(|key| uniform(*key, self.key)), row, level);
+        }
+        let mut normal = [0.0; AT_ONCE];
+        for (row, keys) in row.chunks_mut(AT_ONCE).zip(keys.chunks(AT_ONCE)) {
+            let normal = &mut normal[..keys.len()];
+            self.standard(keys, normal);
+            self.fill_by_normal(keys, normal, row, level);
         }
     }
 
     /// Standard normal numbers for the environments of up to [`AT_ONCE`] `keys`.
+    #[inline(always)]
     fn standard(&self, keys: &[u64], normal: &mut [f64]) {
         normal.iter_mut().zip(keys).for_each(|(z, key)| *z = uniform(*key, self.key));
         match normal {
@@ -283,25 +299,46 @@ impl Entry {
         }
     }
 
-    /// Draws for the environments of `keys`, of which the copula says these standard `normal` numbers.
-    fn fill_by_normal(&self, keys: &[u64], normal: &[f64], row: &mut [f64], level: Level) {
-        if let (Inverse::Normal { mean, std }, true) = (&self.inverse, level == Level::FULL) {
-            row.iter_mut().zip(normal).for_each(|(to, z)| *to = (mean + std * z) * self.factor);
-            return;
-        }
-        for ((to, z), key) in row.iter_mut().zip(normal).zip(keys) {
-            *to = self.levelled(*key, self.inverse.at_normal(*z), level);
+    /// Draws for the environments of `keys`, of which the copula says these standard `normal` numbers; parts take their place where the
+    /// distribution is told in parts.
+    #[inline(always)]
+    fn fill_by_normal(&self, keys: &[u64], normal: &mut [f64], row: &mut [f64], level: Level) {
+        match &self.inverse {
+            Inverse::Normal { mean, std } => {
+                self.fill_with(keys, normal.iter().map(|z| mean + std * z), row, level);
+            }
+            inverse if inverse.takes_normal() => {
+                self.fill_with(keys, normal.iter().map(|z| inverse.at_normal(*z)), row, level);
+            }
+            _ => {
+                normal_parts(normal);
+                self.fill_by_parts(keys, normal.iter().map(|part| open(*part)), row, level);
+            }
         }
     }
 
-    #[inline]
-    fn fill_by(&self, keys: &[u64], row: &mut [f64], level: Level, value: impl Fn(f64) -> f64) {
+    /// Draws for the environments of `keys`, below which these parts of all draws lie.
+    #[inline(always)]
+    fn fill_by_parts(&self, keys: &[u64], parts: impl Iterator<Item = f64>, row: &mut [f64], level: Level) {
+        // What is asked once a row need not be asked once a value.
+        match &self.inverse {
+            &Inverse::Uniform { low, high } => {
+                self.fill_with(keys, parts.map(|u| uniform_at(u, low, high)), row, level);
+            }
+            other => self.fill_with(keys, parts.map(|u| other.at(u)), row, level),
+        }
+    }
+
+    /// Makes what was `drawn` for the environments of `keys` values at `level`.
+    #[inline(always)]
+    fn fill_with(&self, keys: &[u64], drawn: impl Iterator<Item = f64>, row: &mut [f64], level: Level) {
         if level == Level::FULL {
-            row.iter_mut().zip(keys).for_each(|(to, key)| *to = value(uniform(*key, self.key)) * self.factor);
+            let factor = self.factor;
+            row.iter_mut().zip(drawn).for_each(|(to, drawn)| *to = drawn * factor);
             return;
         }
-        for (to, key) in row.iter_mut().zip(keys) {
-            *to = self.levelled(*key, value(uniform(*key, self.key)), level);
+        for ((to, drawn), key) in row.iter_mut().zip(drawn).zip(keys) {
+            *to = self.levelled(*key, drawn, level);
         }
     }
 

@@ -59,6 +59,32 @@ fn draws_are_the_same_however_many_are_drawn_and_by_whom() {
     assert_ne!(other.row(2), all.row(2), "another episode");
 }
 
+/// Of every distribution, some of which take the copula's normal numbers and some the parts below them; blocks are full and not.
+#[test]
+fn correlated_draws_are_the_same_one_by_one_and_many_at_once() {
+    let pairs = mixed().windows(2).map(|pair| [pair[0].target.clone(), pair[1].target.clone()]).collect::<Vec<_>>();
+    let pairs = pairs.into_iter().map(|between| Correlation { between, coefficient: 0.4 }).collect();
+    let randomizer = Randomizer::new(mixed(), pairs).unwrap();
+    let (seed, count) = (Seed(11), 2 * AT_ONCE + 22);
+    for level in [Level::FULL, Level::new(0.5).unwrap()] {
+        let all = randomizer.begin(seed, 0, count, 3, level);
+        let few = randomizer.begin(seed, 60, 8, 3, level);
+        for place in 0..count {
+            let key = Streams::new(seed, Occasion::Reset).environment(place as u64, 3);
+            let standard = |entry: &Entry| [normal_quantile(uniform(key, entry.key))];
+            let mut normal: Vec<[f64; 1]> = randomizer.entries.iter().map(standard).collect();
+            randomizer.groups[0].correlate(&mut normal);
+            for (k, (entry, [z])) in randomizer.entries.iter().zip(normal).enumerate() {
+                let alone = entry.levelled(key, entry.inverse.at_normal(z), level);
+                assert_eq!(all.row(k)[place].to_bits(), alone.to_bits(), "{:?} at {place}", entry.inverse);
+                if let Some(other) = place.checked_sub(60).and_then(|place| few.row(k).get(place)) {
+                    assert_eq!(all.row(k)[place].to_bits(), other.to_bits(), "{:?} at {place}", entry.inverse);
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn threads_change_no_bit() {
     use rayon::prelude::*;
