@@ -208,3 +208,18 @@ fn a_column_that_says_nothing_changes_nothing() {
         assert!(close(&of(&one), &of(&two)), "{count} rows, full: {full}: {:?} and {:?}", of(&one), of(&two));
     }
 }
+
+/// Series of one row each, in which nothing follows anything: transitions stay what they were, and first states are what rows say.
+#[test]
+fn series_of_one_row_tell_no_transitions() {
+    let model = market();
+    let rows = model.simulate(60, Seed(4)).values;
+    let parts: Vec<Observations> = rows.chunks(1).map(|row| Observations::of(row).unwrap()).collect();
+    let few = Settings { iterations: 2, tolerance: 0.0, ..Settings::new(model.states()) };
+    let fit = refit(&model, &parts, &few).unwrap().model;
+    let first: Vec<f64> = parts.iter().map(|part| model.smooth(*part).unwrap()[0]).collect();
+    assert!((fit.initial()[0] - first.iter().sum::<f64>() / 60.0).abs() < 1e-12, "{:?}", fit.initial());
+    for state in 0..model.states() {
+        assert_eq!(fit.transitions(state), model.transitions(state));
+    }
+}

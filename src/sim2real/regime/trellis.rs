@@ -117,8 +117,6 @@ pub(super) struct Trellis {
     ratios: Vec<f64x2>,
     /// Of each half, for each state of its last row as it is come by, how much more likely the other half is than it was given this one.
     beyond: Vec<f64x2>,
-    /// Whether the first row of the last half is behind the series.
-    uneven: bool,
     /// What was found in logarithms, where the recursions do not meet.
     in_logs: Option<in_logs::Trellis>,
     /// Expected number of transitions from the first half into the other, over their probability; none where there is no other.
@@ -160,8 +158,7 @@ impl Trellis {
             }
             course.believe(belief);
         });
-        self.uneven = steps.uneven();
-        if self.uneven {
+        if steps.uneven() {
             // Nothing came from a row that is not there.
             self.beliefs.iter_mut().take(states).for_each(|belief| *belief = belief.with(1, 0.0));
         }
@@ -197,9 +194,7 @@ impl Trellis {
                 ahead[state] = ratio[state] * beta[state];
                 sum += posterior[state];
             }
-            if self.uneven && step == 0 {
-                sum = sum.with(1, 1.0);
-            }
+            // No number of a row behind the series, which nobody is shown.
             let inverse = f64x2::ONE / sum;
             for probability in posterior.iter_mut() {
                 *probability *= inverse;
