@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::normal::{normal_cdf, normal_quantile};
+use crate::sim2real::elementary::exp;
 
 /// How a number is distributed. Units are those of the parameter it is of; of a relative one, the nominal value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -256,7 +257,8 @@ impl Distribution {
                 let within = normal_cdf((high - mean) / std) - below;
                 let beyond = normal_cdf(-(high - mean) / std);
                 let above = [beyond, normal_cdf(-(low - mean) / std) - beyond];
-                Inverse::TruncatedNormal { mean: *mean, std: *std, low: *low, high: *high, below, within, above }
+                let cut = Cut { low: *low, high: *high, below, within, above };
+                Inverse::TruncatedNormal { mean: *mean, std: *std, cut }
             }
             Self::LogNormal { median, sigma } => Inverse::LogNormal { mean: median.ln(), sigma: *sigma },
             Self::Choice { values, weights } => {
@@ -274,42 +276,40 @@ impl Distribution {
     }
 }
 
+/// What is left of a normal distribution between two ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cut {
+    pub low: f64,
+    pub high: f64,
+    /// The part of the whole below the lower end.
+    below: f64,
+    /// The part between them.
+    within: f64,
+    /// The part above the upper end, and that between them told from above.
+    above: [f64; 2],
+}
+
+impl Cut {
+    /// The part of the whole, from the nearer end of it, beyond which a part `u` of what is left lies: below, where the side is 1, or above,
+    /// where it is -1, since parts near to 1 have no more digits to tell them from below.
+    #[inline(always)]
+    pub fn part(&self, u: f64) -> (f64, f64) {
+        let part = self.below + u * self.within;
+        let [beyond, between] = self.above;
+        if part <= 0.5 { (part, 1.0) } else { (beyond + (1.0 - u) * between, -1.0) }
+    }
+}
+
 /// From a number in (0, 1) to a value, and from a standard normal one.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Inverse {
     Constant(f64),
-    Uniform {
-        low: f64,
-        high: f64,
-    },
-    LogUniform {
-        low: f64,
-        high: f64,
-        from: f64,
-        width: f64,
-    },
-    Normal {
-        mean: f64,
-        std: f64,
-    },
-    /// With the part below the lower end, the part within, and the part above the upper end and that within told from above.
-    TruncatedNormal {
-        mean: f64,
-        std: f64,
-        low: f64,
-        high: f64,
-        below: f64,
-        within: f64,
-        above: [f64; 2],
-    },
-    LogNormal {
-        mean: f64,
-        sigma: f64,
-    },
-    Choice {
-        values: Vec<f64>,
-        cumulative: Vec<f64>,
-    },
+    Uniform { low: f64, high: f64 },
+    LogUniform { low: f64, high: f64, from: f64, width: f64 },
+    Normal { mean: f64, std: f64 },
+    TruncatedNormal { mean: f64, std: f64, cut: Cut },
+    LogNormal { mean: f64, sigma: f64 },
+    Choice { values: Vec<f64>, cumulative: Vec<f64> },
 }
 
 impl Inverse {
@@ -319,14 +319,11 @@ impl Inverse {
         match self {
             Self::Constant(value) => *value,
             Self::Uniform { low, high } => uniform_at(u, *low, *high),
-            Self::LogUniform { low, high, from, width } => (from + u * width).exp().clamp(*low, *high),
+            Self::LogUniform { low, high, from, width } => log_uniform_at(u, [*low, *high], *from, *width),
             Self::Normal { mean, std } => mean + std * normal_quantile(u),
-            Self::TruncatedNormal { mean, std, low, high, below, within, above } => {
-                // Parts near to 1 are told from above: there are no more digits to tell them from below.
-                let part = below + u * within;
-                let [beyond, between] = *above;
-                let z = if part <= 0.5 { normal_quantile(part) } else { -normal_quantile(beyond + (1.0 - u) * between) };
-                (mean + std * z).clamp(*low, *high)
+            Self::TruncatedNormal { mean, std, cut } => {
+                let (part, side) = cut.part(u);
+                within(mean + std * side * normal_quantile(part), cut.low, cut.high)
             }
             Self::LogNormal { mean, sigma } => (mean + sigma * normal_quantile(u)).exp(),
             Self::Choice { values, cumulative } => {
@@ -341,7 +338,7 @@ impl Inverse {
         match self {
             Self::Normal { .. } | Self::LogNormal { .. } => true,
             // Nothing is cut off.
-            Self::TruncatedNormal { within, .. } => *within >= 1.0,
+            Self::TruncatedNormal { cut, .. } => cut.within >= 1.0,
             _ => false,
         }
     }
@@ -352,7 +349,7 @@ impl Inverse {
         match self {
             Self::Normal { mean, std } => mean + std * z,
             Self::LogNormal { mean, sigma } => (mean + sigma * z).exp(),
-            Self::TruncatedNormal { mean, std, low, high, .. } if self.takes_normal() => (mean + std * z).clamp(*low, *high),
+            Self::TruncatedNormal { mean, std, cut } if self.takes_normal() => within(mean + std * z, cut.low, cut.high),
             other => other.at(open(normal_cdf(z))),
         }
     }
@@ -362,7 +359,21 @@ impl Inverse {
 /// whether they are in order.
 #[inline(always)]
 pub(super) fn uniform_at(u: f64, low: f64, high: f64) -> f64 {
-    let value = low + u * (high - low);
+    within(low + u * (high - low), low, high)
+}
+
+/// The same where logarithms are uniform, `from` and on for `width`.
+#[inline(always)]
+pub(super) fn log_uniform_at(u: f64, [low, high]: [f64; 2], from: f64, width: f64) -> f64 {
+    let log = from + u * width;
+    within(exp(if log < LARGEST_LOG { log } else { LARGEST_LOG }), low, high)
+}
+
+/// As far as exponentials are told.
+const LARGEST_LOG: f64 = 708.0;
+
+#[inline(always)]
+pub(super) fn within(value: f64, low: f64, high: f64) -> f64 {
     let value = if value < low { low } else { value };
     if value > high { high } else { value }
 }

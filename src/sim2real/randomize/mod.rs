@@ -11,6 +11,7 @@ mod adr;
 mod correlation;
 mod distribution;
 mod ensemble;
+mod entry;
 mod history;
 pub mod image;
 mod level;

@@ -1,11 +1,11 @@
 //! Draws for many environments at once.
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::Arch;
 
 use super::correlation::{Correlation, CorrelationError, Group, groups};
-use super::distribution::{Inverse, open, uniform_at};
+use super::entry::{Alone, Entry, Part, Together, way};
 use super::level::Level;
-use super::normal::{AT_ONCE, normal_parts, normal_quantile, normal_quantiles};
+use super::normal::normal_quantile;
 use super::stream::{DrawKey, Occasion, Streams, name_key, uniform};
 use super::{DrawTable, Implausible, Randomized, Redraw, Target};
 use crate::sim2real::Seed;
@@ -48,33 +48,6 @@ pub struct Randomizer {
     groups: Vec<Group>,
     randomized: Vec<Randomized>,
     correlations: Vec<Correlation>,
-}
-
-/// A parameter made ready for many draws.
-#[derive(Debug, Clone, PartialEq)]
-struct Entry {
-    key: u64,
-    inverse: Inverse,
-    /// What a draw is multiplied by: the nominal value of a relative one.
-    factor: f64,
-    nominal: f64,
-    way: Way,
-    at: Redraw,
-    /// Whether it is drawn with others.
-    grouped: bool,
-}
-
-/// How a value goes from nominal to what was drawn as the level rises.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Way {
-    /// On a straight line.
-    Straight,
-    /// By factors: the logarithm goes on a straight line.
-    ByFactors,
-    /// From infinity, where a limit does nothing: the inverse goes on a straight line.
-    FromInfinity,
-    /// At once, with a probability as large as the level: between two choices there is nothing.
-    AtOnce { key: u64 },
 }
 
 impl Randomizer {
@@ -156,7 +129,9 @@ impl Randomizer {
         assert_eq!(keys.len(), table.environments(), "as many episodes as environments");
         for (k, entry) in self.entries.iter().enumerate() {
             match entry.part_in(occasion) {
-                Part::Drawn if !entry.grouped => entry.fill(&keys, table.row_mut(k), level),
+                Part::Drawn if !entry.grouped => {
+                    Arch::new().dispatch(Alone { entry, keys: &keys, row: table.row_mut(k), level });
+                }
                 Part::Nominal => table.row_mut(k).fill(entry.nominal),
                 Part::Drawn | Part::None => {}
             }
@@ -205,36 +180,6 @@ impl Randomizer {
     }
 }
 
-/// Draws for the members of a group and the environments of `keys`, with the widest vectors of the processor: what is not inlined into it
-/// is compiled without.
-struct Together<'a> {
-    entries: &'a [Entry],
-    group: &'a Group,
-    keys: &'a [u64],
-    table: &'a mut DrawTable,
-    level: Level,
-}
-
-impl NullaryFnOnce for Together<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { entries, group, keys, table, level } = self;
-        let mut normal = vec![[0.0; AT_ONCE]; group.members.len()];
-        for (part, keys) in keys.chunks(AT_ONCE).enumerate() {
-            for (z, k) in normal.iter_mut().zip(&group.members) {
-                entries[*k].standard(keys, &mut z[..keys.len()]);
-            }
-            group.correlate(&mut normal);
-            for (k, z) in group.members.iter().zip(&mut normal) {
-                let row = &mut table.row_mut(*k)[part * AT_ONCE..][..keys.len()];
-                entries[*k].fill_by_normal(keys, &mut z[..keys.len()], row, level);
-            }
-        }
-    }
-}
-
 /// Whose turn it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turn {
@@ -242,138 +187,6 @@ pub struct Turn {
     pub environment: u64,
     /// Number of its episode.
     pub episode: u64,
-}
-
-/// What an occasion does to a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
-    Drawn,
-    Nominal,
-    None,
-}
-
-/// How the value of a parameter goes from nominal to what is drawn.
-fn way(one: &Randomized, name: &str) -> Way {
-    let nominal = one.parameter.nominal;
-    match &one.distribution {
-        super::Distribution::Choice { .. } => Way::AtOnce { key: name_key(&format!("{name}, whether at all")) },
-        _ if nominal.is_infinite() => Way::FromInfinity,
-        distribution if distribution.by_factors() && nominal > 0.0 => Way::ByFactors,
-        _ => Way::Straight,
-    }
-}
-
-impl Entry {
-    fn part_in(&self, occasion: Occasion) -> Part {
-        match (self.at, occasion) {
-            (Redraw::Startup, Occasion::Startup) => Part::Drawn,
-            (Redraw::Reset | Redraw::EverySeconds(_) | Redraw::EverySteps(_), Occasion::Reset) => Part::Drawn,
-            (Redraw::EverySeconds(_) | Redraw::EverySteps(_), Occasion::Interval(_)) => Part::Drawn,
-            (Redraw::Regime(own), Occasion::Regime(entered, _)) if own == entered => Part::Drawn,
-            // The regime is left, or the episode begins in none.
-            (Redraw::Regime(_), Occasion::Regime(..) | Occasion::Reset) => Part::Nominal,
-            _ => Part::None,
-        }
-    }
-
-    /// Draws for the environments of `keys`.
-    fn fill(&self, keys: &[u64], row: &mut [f64], level: Level) {
-        if keys.len() == 1 || !matches!(self.inverse, Inverse::Normal { .. } | Inverse::LogNormal { .. }) {
-            return self.fill_by_parts(keys, keys.iter().map(|key| uniform(*key, self.key)), row, level);
-        }
-        let mut normal = [0.0; AT_ONCE];
-        for (row, keys) in row.chunks_mut(AT_ONCE).zip(keys.chunks(AT_ONCE)) {
-            let normal = &mut normal[..keys.len()];
-            self.standard(keys, normal);
-            self.fill_by_normal(keys, normal, row, level);
-        }
-    }
-
-    /// Standard normal numbers for the environments of up to [`AT_ONCE`] `keys`.
-    #[inline(always)]
-    fn standard(&self, keys: &[u64], normal: &mut [f64]) {
-        normal.iter_mut().zip(keys).for_each(|(z, key)| *z = uniform(*key, self.key));
-        match normal {
-            [z] => *z = normal_quantile(*z),
-            several => normal_quantiles(several),
-        }
-    }
-
-    /// Draws for the environments of `keys`, of which the copula says these standard `normal` numbers; parts take their place where the
-    /// distribution is told in parts.
-    #[inline(always)]
-    fn fill_by_normal(&self, keys: &[u64], normal: &mut [f64], row: &mut [f64], level: Level) {
-        match &self.inverse {
-            Inverse::Normal { mean, std } => {
-                self.fill_with(keys, normal.iter().map(|z| mean + std * z), row, level);
-            }
-            inverse if inverse.takes_normal() => {
-                self.fill_with(keys, normal.iter().map(|z| inverse.at_normal(*z)), row, level);
-            }
-            _ => {
-                normal_parts(normal);
-                self.fill_by_parts(keys, normal.iter().map(|part| open(*part)), row, level);
-            }
-        }
-    }
-
-    /// Draws for the environments of `keys`, below which these parts of all draws lie.
-    #[inline(always)]
-    fn fill_by_parts(&self, keys: &[u64], parts: impl Iterator<Item = f64>, row: &mut [f64], level: Level) {
-        // What is asked once a row need not be asked once a value.
-        match &self.inverse {
-            &Inverse::Uniform { low, high } => {
-                self.fill_with(keys, parts.map(|u| uniform_at(u, low, high)), row, level);
-            }
-            other => self.fill_with(keys, parts.map(|u| other.at(u)), row, level),
-        }
-    }
-
-    /// Makes what was `drawn` for the environments of `keys` values at `level`.
-    #[inline(always)]
-    fn fill_with(&self, keys: &[u64], drawn: impl Iterator<Item = f64>, row: &mut [f64], level: Level) {
-        if level == Level::FULL {
-            let factor = self.factor;
-            row.iter_mut().zip(drawn).for_each(|(to, drawn)| *to = drawn * factor);
-            return;
-        }
-        for ((to, drawn), key) in row.iter_mut().zip(drawn).zip(keys) {
-            *to = self.levelled(*key, drawn, level);
-        }
-    }
-
-    /// The value at `level` where `drawn` is that at the full one.
-    #[inline]
-    fn levelled(&self, key: u64, drawn: f64, level: Level) -> f64 {
-        let (full, part) = (drawn * self.factor, level.get());
-        if part >= 1.0 {
-            return full;
-        }
-        if part <= 0.0 {
-            return self.nominal;
-        }
-        match self.way {
-            Way::Straight => between(self.nominal, full, (1.0 - part) * self.nominal + part * full),
-            Way::ByFactors if full > 0.0 => {
-                let way = (1.0 - part) * self.nominal.ln() + part * full.ln();
-                between(self.nominal, full, way.exp())
-            }
-            Way::ByFactors => between(self.nominal, full, (1.0 - part) * self.nominal + part * full),
-            Way::FromInfinity => full / part,
-            Way::AtOnce { key: own } => {
-                if uniform(key, own) < part {
-                    full
-                } else {
-                    self.nominal
-                }
-            }
-        }
-    }
-}
-
-/// `value`, which rounding may not lead beyond what it lies between.
-fn between(one: f64, other: f64, value: f64) -> f64 {
-    value.clamp(one.min(other), one.max(other))
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
 use super::super::Distribution;
+use super::super::normal::AT_ONCE;
 use super::*;
 use crate::sim2real::Parameter;
 
