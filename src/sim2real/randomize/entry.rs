@@ -144,6 +144,12 @@ impl Entry {
             row.iter_mut().zip(drawn).for_each(|(to, drawn)| *to = drawn * factor);
             return;
         }
+        let part = level.get();
+        if part > 0.0 && self.way == Way::Straight {
+            // Without a question for each value.
+            row.iter_mut().zip(drawn).for_each(|(to, drawn)| *to = straight(self.nominal, drawn * self.factor, part));
+            return;
+        }
         for ((to, drawn), key) in row.iter_mut().zip(drawn).zip(keys) {
             *to = self.levelled(*key, drawn, level);
         }
@@ -160,12 +166,12 @@ impl Entry {
             return self.nominal;
         }
         match self.way {
-            Way::Straight => between(self.nominal, full, (1.0 - part) * self.nominal + part * full),
+            Way::Straight => straight(self.nominal, full, part),
             Way::ByFactors { from } if full > 0.0 => {
                 let way = (1.0 - part) * from + part * full.ln();
                 between(self.nominal, full, way.exp())
             }
-            Way::ByFactors { .. } => between(self.nominal, full, (1.0 - part) * self.nominal + part * full),
+            Way::ByFactors { .. } => straight(self.nominal, full, part),
             Way::FromInfinity => full / part,
             Way::AtOnce { key: own } => {
                 if uniform(key, own) < part {
@@ -178,9 +184,16 @@ impl Entry {
     }
 }
 
+/// The value `part` of the way from one to the other.
+#[inline(always)]
+fn straight(one: f64, other: f64, part: f64) -> f64 {
+    between(one, other, (1.0 - part) * one + part * other)
+}
+
 /// `value`, which rounding may not lead beyond what it lies between.
+#[inline(always)]
 fn between(one: f64, other: f64, value: f64) -> f64 {
-    value.clamp(one.min(other), one.max(other))
+    within(value, one.min(other), one.max(other))
 }
 
 /// Draws of a parameter alone for the environments of `keys`, as those of [`Together`] are.
