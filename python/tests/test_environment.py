@@ -50,6 +50,16 @@ def test_gymnasium_has_nothing_to_say(identity):
 
 
 @pytest.mark.parametrize("identity", IDS)
+def test_made_by_gymnasium_it_checks_by_itself_what_wrappers_would(identity):
+    env = gymnasium.make(identity)
+    assert env is env.unwrapped and env.spec.id == identity
+    with pytest.raises(trueup.InputError, match="reset"):
+        env.step(env.action_space.sample())
+    checked = gymnasium.make(identity, disable_env_checker=False)
+    assert checked is not checked.unwrapped and played(checked, 30, seed=4) == played(env, 30, seed=4)
+
+
+@pytest.mark.parametrize("identity", IDS)
 def test_a_seed_gives_the_same_bits_and_another_does_not(identity):
     env, again = envs.make(identity), gymnasium.make(identity)
     first = played(env, 60, seed=7)

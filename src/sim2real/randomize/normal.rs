@@ -277,6 +277,7 @@ mod tests {
 
     /// Found with 50 digits, by mpmath.
     #[test]
+    #[allow(clippy::excessive_precision, reason = "as found")]
     fn parts_are_those_of_tables_to_the_last_digits_in_tails_too() {
         for (z, part) in [
             (-37.0, 5.725_571_222_524_576_8e-300),

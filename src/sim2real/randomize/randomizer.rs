@@ -7,7 +7,7 @@ use super::entry::{Alone, Entry, Part, Together, way};
 use super::level::Level;
 use super::normal::normal_quantile;
 use super::stream::{DrawKey, Occasion, Streams, name_key, uniform};
-use super::{DrawTable, Implausible, Randomized, Redraw, Target};
+use super::{DrawTable, Implausible, Randomized, Target};
 use crate::sim2real::Seed;
 
 /// Why parameters cannot be randomized together.

@@ -1,5 +1,5 @@
-use super::super::Distribution;
 use super::super::normal::AT_ONCE;
+use super::super::{Distribution, Redraw};
 use super::*;
 use crate::sim2real::Parameter;
 
