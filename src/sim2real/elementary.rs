@@ -97,12 +97,41 @@ pub(crate) fn ln_1p(x: f64) -> f64 {
     whole * LN_2_PARTS[0] + (2.0 * s + (artanh + (whole * LN_2_PARTS[1] + lost)))
 }
 
-/// `2^x` for `|x|` up to 1,000, to some 1e-15 of its value.
+/// Coefficients of `(2^x - 1) / x`, such that `2^x` is right to 1.8e-17 of itself, at most, from -1/2 to 1/2: found with 60 digits by the
+/// exchange of Remez (Cheney, *Introduction to Approximation Theory* (1966), chapter 3).
+#[allow(clippy::excessive_precision, reason = "as found")]
+const DOUBLING: [f64; 11] = [
+    0.693_147_180_559_945_696_75,
+    0.240_226_506_959_100_980_07,
+    5.550_410_866_479_039_455_2e-2,
+    9.618_129_107_607_002_379_6e-3,
+    1.333_355_815_343_996_474_7e-3,
+    1.540_353_044_157_213_033_0e-4,
+    1.525_272_738_519_386_817_1e-5,
+    1.321_544_267_532_982_196_7e-6,
+    1.018_064_765_923_414_404_0e-7,
+    7.072_570_412_814_458_837_3e-9,
+    4.078_071_929_588_342_813_0e-10,
+];
+
+/// Below this a power of two is taken as 0: there it would have fewer digits than elsewhere.
+const LEAST_POWER: f64 = -1_022.0;
+
+/// `2^x` for `x` up to 1,023, to within two units in the last place; 0 below -1,022. It takes a fifth less than [`exp`].
+#[inline(always)]
 pub(crate) fn exp2(x: f64) -> f64 {
-    let whole = (x + 0.5).floor();
-    // A number of 1,000 at most, and a power of two that is put together from its exponent.
-    let power = f64::from_bits(((whole as i64 + 1_023) as u64) << 52);
-    power * exp((x - whole) * LN_2)
+    let shifted = x + ROUNDING;
+    let rest = x - (shifted - ROUNDING);
+    // As above.
+    let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10] = DOUBLING;
+    let (r2, r4) = (rest * rest, (rest * rest) * (rest * rest));
+    let low = (c0 + c1 * rest) + (c2 + c3 * rest) * r2;
+    let middle = (c4 + c5 * rest) + (c6 + c7 * rest) * r2;
+    let high = (c8 + c9 * rest) + c10 * r2;
+    let small = 1.0 + rest * (low + (middle + high * r4) * r4);
+    let power = f64::from_bits(ONE.wrapping_add(shifted.to_bits() << 52));
+    let kept = u64::from(x < LEAST_POWER).wrapping_sub(1);
+    f64::from_bits((small * power).to_bits() & kept)
 }
 
 /// Sine and cosine of an angle of some turns at most [rad], to some 1e-15.
@@ -166,6 +195,16 @@ mod tests {
             let (x, less) = (f64::from(step - 50_000) / 128.0, 1e-8 * f64::from(step));
             assert!(close(exp_less(x, less), x.exp() * (-less).exp(), 0.0), "e^({x} - {less})");
         }
+        for step in 0..=200_000 {
+            for x in [-1_022.0 + 2_045.0 * f64::from(step) / 200_000.0, f64::from(step - 100_000) * 1e-5] {
+                assert!(close(exp2(x), x.exp2(), 0.0), "2^{x}: {} and {}", exp2(x), x.exp2());
+            }
+        }
+        assert_eq!(
+            [exp2(0.0), exp2(-1_022.1), exp2(-5e299), exp2(f64::NEG_INFINITY), exp2(-3.0)],
+            [1.0, 0.0, 0.0, 0.0, 0.125]
+        );
+        assert!(exp2(f64::NAN).is_nan());
         assert_eq!([exp(0.0), exp(-708.1), exp(-5e299), exp(f64::NEG_INFINITY), ln_1p(0.0)], [1.0, 0.0, 0.0, 0.0, 0.0]);
         assert!(exp(f64::NAN).is_nan());
     }

@@ -102,7 +102,7 @@ struct Ways<'a, S> {
     steps: Steps<'a>,
     scores: Scores<S>,
     /// Of each state of a step after the first, whether the best path comes from that state, of those up to it: a bit a step,
-    /// `[word][to][from - 1]`, the last step in the lowest.
+    /// `[word][to][from]`, the last step in the lowest.
     choices: Vec<u64x2>,
 }
 
@@ -122,7 +122,7 @@ impl<'a, S: PerState<Of = f64x2>> Ways<'a, S> {
         let steps = Steps::of::<f64x2>(series);
         let begin = S::of(states, |state| begin[state]);
         let mut scores = Scores { best: begin.clone(), next: begin };
-        let words = states * (states - 1);
+        let words = states * states;
         let mut choices = vec![u64x2::ZERO; words * steps.count.div_ceil(WORD)];
         each_block(model, Evaluated::Logarithms, steps, |block| {
             let choices = &mut choices[block.from / WORD * words..][..words];
@@ -134,21 +134,21 @@ impl<'a, S: PerState<Of = f64x2>> Ways<'a, S> {
     /// Shows `write` which state each of the first `to` steps from an end is in, the last steps first, where the best path goes on to
     /// `state`.
     fn trace(&self, end: usize, mut state: usize, mut to: usize, mut write: impl FnMut(Range<usize>, usize)) {
-        let others = self.scores.best.as_ref().len() - 1;
+        let states = self.scores.best.as_ref().len();
         while to > 0 {
             let first = (to - 1) / WORD * WORD;
             // The lowest bit is that of the word's last step.
             let bit = (first + WORD).min(self.steps.count) - to;
-            let choices = &self.choices[(first / WORD * (others + 1) + state) * others..][..others];
-            let chosen = |from: usize| choices[from - 1].as_array_ref()[end] >> bit;
-            let later = (state + 1..=others).fold(0, |bits, from| bits | chosen(from));
+            let choices = &self.choices[(first / WORD * states + state) * states..][..states];
+            let chosen = |from: usize| choices[from].as_array_ref()[end] >> bit;
+            let later = (state + 1..states).fold(0, |bits, from| bits | chosen(from));
             let stays = if state == 0 { !later } else { chosen(state) & !later };
             let stayed = (stays.trailing_ones() as usize).min(to - first);
             write(to - stayed..to, state);
             to -= stayed;
             if to > first {
                 let came = |from: &usize| chosen(*from) >> stayed & 1 == 1;
-                state = (1..=others).rev().find(came).unwrap_or(0);
+                state = (1..states).rev().find(came).unwrap_or(0);
                 write(to - 1..to, state);
                 to -= 1;
             }
@@ -166,21 +166,21 @@ fn choose<S: PerState<Of = f64x2>>(
     choices: &mut [u64x2],
 ) {
     let Scores { mut best, mut next } = scores.clone();
+    let states = best.as_ref().len();
+    let mut words = S::each(states, |_| S::each(states, |_| u64x2::ZERO));
     block.each_step::<S>(|step, densities| {
         let (best, next) = (best.as_mut(), next.as_mut());
         let states = best.len();
         let transition = &transition[..states * states];
-        let choices = &mut choices[..states * (states - 1)];
         for ((best, before), density) in best.iter_mut().zip(&*next).zip(densities.as_ref()) {
             *best = *before + *density;
         }
-        for to in 0..states {
+        for (to, words) in words.as_mut().iter_mut().enumerate() {
             let mut score = best[0] + transition[to];
-            for from in 1..states {
+            for (from, bits) in words.as_mut().iter_mut().enumerate().skip(1) {
                 let candidate = best[from] + transition[from * states + to];
                 // All bits of what is better are set, which is -1.
                 let better: u64x2 = bytemuck::cast(candidate.cmp_gt(score));
-                let bits = &mut choices[to * (states - 1) + from - 1];
                 *bits = *bits + *bits - better;
                 score = candidate.fast_max(score);
             }
@@ -192,4 +192,7 @@ fn choose<S: PerState<Of = f64x2>>(
         }
     });
     *scores = Scores { best, next };
+    for (kept, words) in choices.chunks_exact_mut(states).zip(words.as_ref()) {
+        kept.copy_from_slice(words.as_ref());
+    }
 }

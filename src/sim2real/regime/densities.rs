@@ -1,5 +1,7 @@
 //! How likely a row is in each state: densities made ready to be evaluated, of a row or of several at once.
 
+use std::f64::consts::LOG2_E;
+
 use nalgebra::DMatrix;
 use pulp::{Arch, NullaryFnOnce};
 use statrs::function::gamma::ln_gamma;
@@ -7,7 +9,7 @@ use wide::f64x2;
 
 use super::ends::{Ends, LANES, PerState, Steps};
 use super::{Emission, HiddenMarkov, RegimeError, Spread};
-use crate::sim2real::elementary::{exp, ln_1p};
+use crate::sim2real::elementary::{exp2, ln_1p};
 
 /// Squared distances are cut here, so that a density is never 0 in all states at once.
 const FARTHEST: f64 = 1e300;
@@ -126,20 +128,24 @@ impl Densities {
     /// Writes the logarithm of each state's density at `row`; 0 in all states where the row was lost.
     pub fn logarithms(&self, row: &[f64], into: &mut [f64]) {
         let (into, _) = into.as_chunks_mut::<1>();
-        self.evaluate(row.as_chunks::<1>().0, 0.0, into);
+        self.evaluate(row.as_chunks::<1>().0, Unit::Natural, into);
     }
 
     /// Writes each state's density at `row` over the highest that any has; 1 in all states where the row was lost.
     #[inline(always)]
     pub fn weights(&self, row: &[f64], into: &mut [f64]) {
-        self.evaluate(row.as_chunks::<1>().0, self.highest, into.as_chunks_mut::<1>().0);
-        into.iter_mut().for_each(|value| *value = exp(*value));
+        self.evaluate(row.as_chunks::<1>().0, Unit::Bits, into.as_chunks_mut::<1>().0);
+        into.iter_mut().for_each(|value| *value = exp2(*value));
     }
 
-    /// Of rows side by side, `[column][row]`, writes the logarithm of each density less `less`, `[state][row]`, 0 where a row was lost.
-    /// The bits are the same however many rows there are.
+    /// Of rows side by side, `[column][row]`, writes the logarithm of each density, `[state][row]`, 0 where a row was lost. The bits are the
+    /// same however many rows there are.
     #[inline(always)]
-    fn evaluate<const N: usize>(&self, columns: &[[f64; N]], less: f64, into: &mut [[f64; N]]) {
+    fn evaluate<const N: usize>(&self, columns: &[[f64; N]], unit: Unit, into: &mut [[f64; N]]) {
+        let (less, size) = match unit {
+            Unit::Natural => (0.0, 1.0),
+            Unit::Bits => (self.highest, LOG2_E),
+        };
         // First squared distances. Most series have one column: no more is done than must be.
         if let [column] = columns {
             for ((logs, mean), whitening) in into.iter_mut().zip(&self.means).zip(&self.whitening) {
@@ -154,16 +160,16 @@ impl Densities {
         }
         if let Some(degrees) = &self.degrees {
             for ((logs, peak), nu) in into.iter_mut().zip(&self.peaks).zip(degrees) {
-                let (top, half) = (peak - less, 0.5 * (nu + self.width as f64));
+                let (top, half) = ((peak - less) * size, 0.5 * (nu + self.width as f64) * size);
                 for log in logs {
                     *log = top - half * ln_1p(bounded(*log / nu));
                 }
             }
         } else {
             for (logs, peak) in into.iter_mut().zip(&self.peaks) {
-                let top = peak - less;
+                let (top, half) = ((peak - less) * size, 0.5 * size);
                 for log in logs {
-                    *log = top - 0.5 * *log;
+                    *log = top - half * *log;
                 }
             }
         }
@@ -192,6 +198,14 @@ fn bounded(distance: f64) -> f64 {
     if distance < FARTHEST { distance } else { FARTHEST }
 }
 
+/// What logarithms of densities are told in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Unit {
+    Natural,
+    /// To the base of 2, over the highest density.
+    Bits,
+}
+
 /// What is evaluated of each row and state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Evaluated {
@@ -215,8 +229,10 @@ impl<X: Ends> Block<'_, X> {
     /// Shows `see` each step with what is evaluated of its rows in each state.
     #[inline(always)]
     pub fn each_step<S: PerState<Of = X>>(&self, mut see: impl FnMut(usize, &mut S)) {
+        let columns = S::each(self.values.len(), |state| &self.values[state]);
         for lane in 0..self.count {
-            let mut values = S::of(self.values.len(), |state| self.values[state].as_ref()[lane % (LANES / X::COUNT)]);
+            let value = |state: usize| columns.as_ref()[state].as_ref()[lane % (LANES / X::COUNT)];
+            let mut values = S::of(self.values.len(), value);
             see(self.from + lane, &mut values);
         }
     }
@@ -251,10 +267,10 @@ impl NullaryFnOnce for Evaluation<'_> {
     fn call(self) {
         let Self { densities, evaluated, columns, into } = self;
         match evaluated {
-            Evaluated::Logarithms => densities.evaluate(columns, 0.0, into),
+            Evaluated::Logarithms => densities.evaluate(columns, Unit::Natural, into),
             Evaluated::Weights => {
-                densities.evaluate(columns, densities.highest, into);
-                into.as_flattened_mut().iter_mut().for_each(|value| *value = exp(*value));
+                densities.evaluate(columns, Unit::Bits, into);
+                into.as_flattened_mut().iter_mut().for_each(|value| *value = exp2(*value));
             }
         }
     }

@@ -99,23 +99,40 @@ pub(super) trait PerState: AsRef<[Self::Of]> + AsMut<[Self::Of]> + Clone + Debug
     /// Of one end or both.
     type Of: Ends;
 
+    /// Whatever else there is one of for each state.
+    type Each<T>: AsRef<[T]> + AsMut<[T]>;
+
     /// Those of so many states.
     fn of(states: usize, of: impl FnMut(usize) -> Self::Of) -> Self;
+
+    /// One for each of so many states.
+    fn each<T>(states: usize, of: impl FnMut(usize) -> T) -> Self::Each<T>;
 }
 
 impl<X: Ends> PerState for Vec<X> {
     type Of = X;
+    type Each<T> = Vec<T>;
 
     fn of(states: usize, of: impl FnMut(usize) -> X) -> Self {
+        (0..states).map(of).collect()
+    }
+
+    fn each<T>(states: usize, of: impl FnMut(usize) -> T) -> Vec<T> {
         (0..states).map(of).collect()
     }
 }
 
 impl<X: Ends, const N: usize> PerState for [X; N] {
     type Of = X;
+    type Each<T> = [T; N];
 
     #[inline(always)]
     fn of(_: usize, of: impl FnMut(usize) -> X) -> Self {
+        std::array::from_fn(of)
+    }
+
+    #[inline(always)]
+    fn each<T>(_: usize, of: impl FnMut(usize) -> T) -> [T; N] {
         std::array::from_fn(of)
     }
 }
@@ -183,11 +200,14 @@ impl<'a> Steps<'a> {
         let place = |step: usize, end: usize| (step * X::COUNT + end) % LANES;
         let first = self.series.slice(from, to);
         let last = self.series.slice(X::COUNT * self.count - to, X::COUNT * self.count - from);
-        if let [column] = into {
-            first.values().iter().enumerate().for_each(|(step, x)| column[place(step, 0)] = *x);
-            if X::COUNT > 1 {
-                last.values().iter().rev().enumerate().for_each(|(step, x)| column[place(alone + step, 1)] = *x);
+        if let ([column], 2) = (&mut *into, X::COUNT) {
+            // Most series have one column: both rows of a step are written at once.
+            let (pairs, _) = column.as_chunks_mut::<2>();
+            if let ([pair, ..], [x, ..]) = (&mut *pairs, &first.values()[..alone]) {
+                pair[0] = *x;
             }
+            let rows = first.values()[alone..].iter().zip(last.values().iter().rev());
+            pairs[alone..].iter_mut().zip(rows).for_each(|(pair, (first, last))| *pair = [*first, *last]);
             return;
         }
         let mut write = |place: usize, row: &[f64]| into.iter_mut().zip(row).for_each(|(column, x)| column[place] = *x);
