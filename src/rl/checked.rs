@@ -260,6 +260,7 @@ fn check_actions(about: &About, lanes: usize, size: usize, actions: Actions<'_>)
 fn check_choices(about: &About, values: &[i64], n: &[usize]) -> Result<(), EnvError> {
     let within = |value: i64, n: usize| usize::try_from(value).is_ok_and(|value| value < n);
     let bad = match n {
+        [n] if all_below(values, *n) => None,
         [n] => values.iter().position(|value| !within(*value, *n)),
         _ => (0..values.len()).find(|k| !within(values[*k], n[k % n.len()])),
     };
@@ -271,6 +272,13 @@ fn check_choices(about: &About, values: &[i64], n: &[usize]) -> Result<(), EnvEr
             Err(EnvError::Action { lane, component, value: values[at] as f64, low: 0.0, high: n[k] as f64 - 1.0 })
         }
     }
+}
+
+/// Whether all values are from 0 to below `n`: without a branch in the loop, which is run over all lanes at every step.
+fn all_below(values: &[i64], n: usize) -> bool {
+    let Ok(n) = i64::try_from(n) else { return false };
+    // Of a value below 0 the sign is set, of one from `n` on that of the difference.
+    values.iter().fold(0, |signs, value| signs | value | (n - 1).wrapping_sub(*value)) >= 0
 }
 
 #[cfg(test)]

@@ -184,7 +184,31 @@ impl<'a> Which<'a> {
 
     /// Their numbers, of `lanes` lanes.
     pub fn iter(self, lanes: usize) -> impl Iterator<Item = usize> + use<'a> {
-        (0..lanes).filter(move |lane| self.has(*lane))
+        // Eight at a time: of most masks most are false.
+        (0..lanes).step_by(8).flat_map(move |first| {
+            let mut word = self.word(first, lanes);
+            std::iter::from_fn(move || {
+                let lane = first + word.trailing_zeros() as usize / 8;
+                let some = word != 0;
+                word &= word.wrapping_sub(1);
+                some.then_some(lane)
+            })
+        })
+    }
+
+    /// Whether each of eight lanes from lane `first` on is among them: a byte a lane, the first in the lowest.
+    fn word(self, first: usize, lanes: usize) -> u64 {
+        let count = (lanes - first).min(8);
+        match self {
+            Self::All => 0x0101_0101_0101_0101 >> (8 * (8 - count)),
+            Self::Mask(mask) => {
+                let bytes: &[u8] = bytemuck::cast_slice(&mask[first..first + count]);
+                match bytes.first_chunk() {
+                    Some(eight) => u64::from_le_bytes(*eight),
+                    None => bytes.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte)),
+                }
+            }
+        }
     }
 
     /// Whether any is among them.
@@ -288,6 +312,23 @@ impl Buffers {
             rewards: &mut self.rewards,
             terminated: &mut self.terminated,
             truncated: &mut self.truncated,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_of_a_mask_are_those_that_are_true() {
+        for lanes in 0..30 {
+            assert!(Which::All.iter(lanes).eq(0..lanes));
+            for pattern in [0, u64::MAX, 0x8040_2010_0804_0201, 0x0101_0101_0101_0101, 0xdead_beef_1234_5678] {
+                let mask: Vec<bool> = (0..lanes).map(|lane| pattern >> lane & 1 == 1).collect();
+                let which = Which::Mask(&mask);
+                assert!(which.iter(lanes).eq((0..lanes).filter(|lane| mask[*lane])), "{mask:?}");
+            }
         }
     }
 }

@@ -69,6 +69,8 @@ class BoundEnvironment:
             self.truncations.view(np.bool_),
         )
         self._step = self._bound.step
+        # All there is to tell is in the buffers: a step makes nothing new.
+        self._told = (self.observations, self.rewards, self.terminals, self.truncations, ())
 
     def reset(self, seed: int | None = None) -> tuple[np.ndarray, list]:
         """Begin an episode in every lane: the buffer of observations, and no info."""
@@ -80,11 +82,11 @@ class BoundEnvironment:
         return self.observations, []
 
     def step(self, actions: np.ndarray | None = None):
-        """Take a step by the buffer of actions, into which `actions` are written before where they are given: all buffers, and info."""
+        """Take a step by the buffer of actions, into which `actions` are written before where they are given: all buffers, and no info."""
         if actions is not None:
             self.actions[...] = actions
         self._step()
-        return self.observations, self.rewards, self.terminals, self.truncations, []
+        return self._told
 
     def close(self) -> None:
         self.env.close()
