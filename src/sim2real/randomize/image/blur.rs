@@ -1,13 +1,15 @@
 //! Blur: optics out of focus.
 
 use bytemuck::{cast_slice, cast_slice_mut};
+use wide::f32x8;
 
 use super::draw::Uniform;
 use super::effect::{Effect, EffectParameter};
 use super::error::ImageError;
-use super::pixel::Pixel;
+use super::line::LANES;
 use super::scene::Scene;
 use super::settings::Setting;
+use super::view::Value;
 
 /// A bell-shaped blur of the standard deviation `std`, as large across as along.
 ///
@@ -48,52 +50,100 @@ impl Setting for Blur {
 }
 
 impl Blur {
-    /// Blurs what is within the scene's margin; `lines` is room for three rows.
+    /// Takes `values` into the scene, blurred; `lines` is room for three rows.
     #[inline(always)]
-    pub(super) fn apply<const C: usize>(self, scene: &mut Scene, lines: &mut [Vec<Pixel>; 3]) {
+    pub(super) fn take<V: Value, const C: usize>(self, values: &[V], scene: &mut Scene, lines: &mut [Vec<f32x8>; 3]) {
         let weight = 0.5 * f64::from(self.std) * f64::from(self.std);
         let passes = (weight / LARGEST).ceil();
         let beside = (weight / passes) as f32;
-        lines.iter_mut().for_each(|line| line.resize(scene.stride(), Pixel::ZERO));
-        for _ in 0..passes as usize {
-            pass::<C>(scene, lines, beside);
+        if self == Self::NONE {
+            for y in 0..scene.height() {
+                scene.take_row::<V, C>(y, values);
+            }
+        }
+        let lanes = (scene.width() * C).div_ceil(LANES);
+        lines.iter_mut().for_each(|line| line.resize(lanes, f32x8::ZERO));
+        for at in 0..passes as usize {
+            pass::<V, C>((at == 0).then_some(values), scene, lines, beside);
         }
     }
 }
 
-/// Along each row, and across it as soon as the next one is ready: an image is too large for the nearest memory, rows are not.
+/// Along each row, and across the one above at the same time. A row may have to be taken from `values` before: an image is
+/// too large for the nearest memory, rows are not.
 #[inline(always)]
-fn pass<const C: usize>(scene: &mut Scene, [above, line, below]: &mut [Vec<Pixel>; 3], beside: f32) {
-    along::<C>(scene.row_and_margin(1), line, beside);
+fn pass<V: Value, const C: usize>(values: Option<&[V]>, scene: &mut Scene, lines: &mut [Vec<f32x8>; 3], beside: f32) {
+    let (width, height) = (scene.width(), scene.height());
+    let [above, line, below] = lines;
+    // A row ahead: what has only just been written cannot be read at other places without waiting.
+    prepare::<V, C>(values, scene, 0);
+    prepare::<V, C>(values, scene, 1);
+    along::<C>(scene.row_and_margin(1), cast_slice_mut(line), beside);
     // Above the first row it is as in it, and below the last.
     above.copy_from_slice(line);
-    for y in 1..=scene.height() {
-        if y < scene.height() {
-            along::<C>(scene.row_and_margin(y + 1), below, beside);
-        } else {
-            below.copy_from_slice(line);
-        }
-        mix::<C>(scene.row_and_margin(y), [above, line, below], beside);
+    for y in 0..height - 1 {
+        prepare::<V, C>(values, scene, y + 2);
+        let (into, row) = scene.two_rows(y + 1);
+        let rows = [&*above, &*line].map(|line| cast_slice(line));
+        both::<C>(row, cast_slice_mut(below), rows, &mut into[LANES..], beside);
         std::mem::swap(above, line);
         std::mem::swap(line, below);
     }
+    let rows = [&*above, &*line, &*line].map(|line| cast_slice(line));
+    mix::<C>(&mut scene.row_and_margin(height)[LANES..LANES + width * C], rows, beside);
 }
 
-/// Blurs a row, beyond whose ends it is as at them.
+/// Takes row `y` from `values`, if it has to be, and makes what is beyond its ends as they are.
 #[inline(always)]
-fn along<const C: usize>(row: &mut [Pixel], into: &mut [Pixel], beside: f32) {
-    let last = row.len() - 1;
-    (row[0], row[last]) = (row[1], row[last - 1]);
-    mix::<C>(&mut into[1..last], [&row[..last - 1], &row[1..last], &row[2..]], beside);
+fn prepare<V: Value, const C: usize>(values: Option<&[V]>, scene: &mut Scene, y: usize) {
+    if y < scene.height() {
+        if let Some(values) = values {
+            scene.take_row::<V, C>(y, values);
+        }
+        let (start, end) = (LANES, LANES + scene.width() * C);
+        let row = scene.row_and_margin(y + 1);
+        row.copy_within(start..start + C, start - C);
+        row.copy_within(end - C..end, end);
+    }
 }
 
-/// Spreads the second row by the weight `beside` over the first and the third. It is done number by number: of such a loop compilers make
-/// the widest vectors, of one over pixels they do not.
+/// A row and what is left and right of each of its pixels.
 #[inline(always)]
-fn mix<const C: usize>(into: &mut [Pixel], rows: [&[Pixel]; 3], beside: f32) {
+fn beside_each<const C: usize>(row: &[f32]) -> [&[f32]; 3] {
+    [LANES - C, LANES, LANES + C].map(|start| &row[start..])
+}
+
+/// Blurs a row.
+#[inline(always)]
+fn along<const C: usize>(row: &[f32], into: &mut [f32], beside: f32) {
+    mix::<C>(into, beside_each::<C>(row), beside);
+}
+
+/// Blurs a row into `below`, and at once the one above it, `line`, across.
+#[inline(always)]
+fn both<const C: usize>(row: &[f32], below: &mut [f32], [above, line]: [&[f32]; 2], into: &mut [f32], beside: f32) {
     let own = 1.0 - 2.0 * beside;
-    let into: &mut [f32] = cast_slice_mut(into);
-    let [before, row, after] = rows.map(cast_slice::<Pixel, f32>);
+    let [before, itself, after] = beside_each::<C>(row);
+    let rows = before.iter().zip(itself).zip(after).zip(above).zip(line);
+    for ((below, into), ((((before, itself), after), above), line)) in below.iter_mut().zip(&mut *into).zip(rows) {
+        *below = own * itself + beside * (before + after);
+        *into = own * line + beside * (above + *below);
+    }
+    if C == 4 {
+        // Alpha is not blurred.
+        for (below, itself) in below.iter_mut().zip(itself).skip(3).step_by(4) {
+            *below = *itself;
+        }
+        for (into, line) in into.iter_mut().zip(line).skip(3).step_by(4) {
+            *into = *line;
+        }
+    }
+}
+
+/// Spreads the second row by the weight `beside` over the first and the third.
+#[inline(always)]
+fn mix<const C: usize>(into: &mut [f32], [before, row, after]: [&[f32]; 3], beside: f32) {
+    let own = 1.0 - 2.0 * beside;
     for (((into, before), itself), after) in into.iter_mut().zip(before).zip(row).zip(after) {
         *into = own * itself + beside * (before + after);
     }

@@ -1,6 +1,6 @@
 //! The effects that act on a pixel's colour alone, as one step: a 3 x 3 matrix and an offset.
 
-use super::pixel::{Pixel, pixel};
+use super::line::Line;
 
 /// `x -> matrix x + offset`, with `x` from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,29 +30,38 @@ impl ColourMap {
 
     /// Made ready for pixels whose white is `full`.
     pub fn ready(&self, full: f32) -> Colour {
-        let columns = [0, 1, 2].map(|j| self.matrix.map(|row| row[j] as f32));
-        let [red, green, blue] = columns.map(|[r, g, b]| pixel([r, g, b, 0.0]));
-        let [r, g, b] = self.offset.map(|value| value as f32 * full);
-        Colour { red, green, blue, offset: pixel([r, g, b, 0.0]) }
+        Colour {
+            matrix: self.matrix.map(|row| row.map(|value| value as f32)),
+            offset: self.offset.map(|value| value as f32 * full),
+        }
     }
 }
 
 /// A [`ColourMap`] as pixels go through it.
 #[derive(Clone, Copy)]
 pub(super) struct Colour {
-    red: Pixel,
-    green: Pixel,
-    blue: Pixel,
-    offset: Pixel,
+    matrix: [[f32; 3]; 3],
+    offset: [f32; 3],
 }
 
 impl Colour {
-    /// What becomes of a pixel; its alpha stays what it is.
+    /// What becomes of a row of `C` channels; alpha stays what it is.
     #[inline(always)]
-    pub fn apply<const C: usize>(&self, place: Pixel) -> Pixel {
-        let [r, g, b, _] = place.to_array();
-        let light = self.red * Pixel::splat(r) + self.green * Pixel::splat(g) + (self.blue * Pixel::splat(b) + self.offset);
-        // Where there is no alpha nothing looks at it.
-        if C == 4 { light + pixel([0.0, 0.0, 0.0, 1.0]) * place } else { light }
+    pub fn apply<const C: usize>(&self, line: &mut Line) {
+        let Self { matrix, offset } = *self;
+        let [red, green, blue, _] = line.channels_mut();
+        if C == 1 {
+            for grey in red {
+                *grey = matrix[0][0] * *grey + offset[0];
+            }
+            return;
+        }
+        for ((red, green), blue) in red.iter_mut().zip(green).zip(blue) {
+            let mix = |row: usize| {
+                let [r, g, b] = matrix[row];
+                r * *red + g * *green + (b * *blue + offset[row])
+            };
+            (*red, *green, *blue) = (mix(0), mix(1), mix(2));
+        }
     }
 }

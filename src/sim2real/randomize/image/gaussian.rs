@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use super::pixel::{Pixel, pixel};
+use super::line::LANES;
 use crate::sim2real::elementary::exp;
 use crate::sim2real::split_mix::scattered;
 
@@ -84,13 +84,18 @@ impl Normal {
         Self { table: &TABLE, counter: Counter::new(key) }
     }
 
-    /// A draw for each channel of one pixel; none for alpha.
+    /// Draws for red, green and blue of the pixels whose numbers begin with `first`.
     #[inline(always)]
-    pub fn draw(&self, number: u64) -> Pixel {
+    pub fn draw(&self, first: u64) -> [[f32; LANES]; 3] {
         const LOW: u64 = QUANTILES as u64 - 1;
-        let bits = self.counter.bits(number);
-        let draw = |shift: u32| self.table[(bits >> shift & LOW) as usize];
-        pixel([draw(0), draw(12), draw(24), 0.0])
+        let mut draws = [[0.0; LANES]; 3];
+        for (at, number) in (first..).take(LANES).enumerate() {
+            let bits = self.counter.bits(number);
+            for (draws, shift) in draws.iter_mut().zip([0, 12, 24]) {
+                draws[at] = self.table[(bits >> shift & LOW) as usize];
+            }
+        }
+        draws
     }
 }
 
@@ -121,7 +126,8 @@ mod tests {
         let written = [(0, 0), (0, 1), (7, 0), (u64::MAX, 3)];
         let written = written.map(|(key, number)| format!("{:016x}", Counter::new(key).bits(number)));
         insta::assert_debug_snapshot!(written);
-        let draws = [40, 41].map(|number| Normal::new(7).draw(number).to_array().map(f32::to_bits));
+        let [red, green, blue] = Normal::new(7).draw(40).map(|channel| channel.map(f32::to_bits));
+        let draws = [0, 1].map(|at| [red[at], green[at], blue[at], 0]);
         insta::assert_debug_snapshot!(draws);
     }
 

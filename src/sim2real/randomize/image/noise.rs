@@ -4,7 +4,8 @@ use super::draw::Uniform;
 use super::effect::{Effect, EffectParameter};
 use super::error::ImageError;
 use super::gaussian::Normal;
-use super::pixel::Pixel;
+use super::line::{LANES, Line};
+use super::rounding::upper;
 use super::settings::Setting;
 
 /// `x -> x + sqrt(read^2 + shot^2 max(x, 0)) n`, `n` normal, independent from pixel to pixel and channel to channel.
@@ -52,7 +53,7 @@ impl Noise {
     /// Made ready for an image with this key, whose white is `full`.
     pub(super) fn ready(self, key: u64, full: f32) -> Noisy {
         let (dark, of_light) = (self.read * self.read * full * full, self.shot * self.shot * full);
-        Noisy { dark: Pixel::splat(dark), of_light: Pixel::splat(of_light), normal: Normal::new(key) }
+        Noisy { dark, of_light, normal: Normal::new(key) }
     }
 }
 
@@ -60,17 +61,25 @@ impl Noise {
 #[derive(Clone, Copy)]
 pub(super) struct Noisy {
     /// Variance in the dark.
-    dark: Pixel,
+    dark: f32,
     /// Variance by light.
-    of_light: Pixel,
+    of_light: f32,
     normal: Normal,
 }
 
 impl Noisy {
-    /// What becomes of the pixel with the number `counter`; its alpha stays what it is.
+    /// What becomes of a row of `C` channels, of which the first pixel has the number `first`; alpha stays what it is.
     #[inline(always)]
-    pub fn apply(&self, pixel: Pixel, counter: u64) -> Pixel {
-        pixel + (self.dark + self.of_light * pixel.fast_max(Pixel::ZERO)).sqrt() * self.normal.draw(counter)
+    pub fn apply<const C: usize>(&self, line: &mut Line, first: u64) {
+        let [red, green, blue, _] = line.channels_mut().map(|channel| channel.as_chunks_mut::<LANES>().0);
+        for (((red, green), blue), first) in red.iter_mut().zip(green).zip(blue).zip((first..).step_by(LANES)) {
+            // Roots take their time, in which the processor draws.
+            for (place, draws) in [red, green, blue].into_iter().zip(self.normal.draw(first)).take(C) {
+                for (value, draw) in place.iter_mut().zip(draws) {
+                    *value += (self.dark + self.of_light * upper(*value, 0.0)).sqrt() * draw;
+                }
+            }
+        }
     }
 }
 

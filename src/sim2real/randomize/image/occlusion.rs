@@ -4,7 +4,6 @@ use super::draw::Uniform;
 use super::effect::{Effect, EffectParameter};
 use super::error::ImageError;
 use super::gaussian::Counter;
-use super::pixel::Pixel;
 use super::settings::Setting;
 use super::view::{Shape, Value};
 use crate::sim2real::elementary::exp2;
@@ -127,9 +126,9 @@ impl Occlusion {
     /// Covers parts of an image of `C` channels.
     pub(super) fn apply<V: Value, const C: usize>(&self, values: &mut [V], shape: Shape, draws: Counter) {
         let constant = match self.fill {
-            Fill::Constant(grey) => [value(grey * V::FULL); C],
-            Fill::Mean => mean::<V, C>(values).map(value),
-            Fill::Noise => [value(0.0); C],
+            Fill::Constant(grey) => [V::nearest(grey * V::FULL); C],
+            Fill::Mean => mean::<V, C>(values).map(V::nearest),
+            Fill::Noise => [V::nearest(0.0); C],
         };
         let light = C.min(3);
         for rectangle in &self.rectangles {
@@ -154,16 +153,11 @@ fn span(start: f32, length: f32, pixels: usize) -> [usize; 2] {
     [edge(start).min(pixels), edge(start + length).min(pixels)]
 }
 
-/// A number as a value.
-fn value<V: Value>(number: f32) -> V {
-    V::nearest(&[Pixel::splat(number); 4])[0][0]
-}
-
 /// Each value from its own 21 bits.
 fn speckle<V: Value>(light: &mut [V], bits: u64) {
     for (channel, place) in light.iter_mut().enumerate() {
         let part = (bits >> (21 * channel) & 0x1f_ffff) as f32 / 2_097_151.0;
-        *place = value(part * V::FULL);
+        *place = V::nearest(part * V::FULL);
     }
 }
 

@@ -1,23 +1,33 @@
-//! All effects on one image, a row at a time.
+//! All effects on one image, some rows at a time.
+
+use std::ops::Range;
 
 use pulp::{Arch, NullaryFnOnce};
+use wide::f32x8;
 
-use super::colour::Colour;
 use super::gaussian::Counter;
-use super::noise::{Noise, Noisy};
-use super::pixel::{Pixel, load, store};
+use super::line::Line;
+use super::noise::Noise;
 use super::scene::Scene;
-use super::settings::{Setting, Settings};
+use super::settings::{Setting, Settings, Way};
 use super::view::{Shape, Value};
-use super::warp::Warp;
+use super::warp::{Pair, Warp};
+
+/// How many rows go through the effects at a time: about 512 pixels, enough that what is done once for all of them does not
+/// count, and few enough for the nearest memory.
+fn band(shape: Shape) -> usize {
+    (512 / shape.width).max(1)
+}
 
 /// Room for one image under way.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     scene: Scene,
-    blurred: [Vec<Pixel>; 3],
+    blurred: [Vec<f32x8>; 3],
     warp: Warp,
-    line: Vec<Pixel>,
+    moved: Vec<f32>,
+    seen: Vec<Pair>,
+    line: Line,
 }
 
 /// All effects on one image, with the widest vectors of the processor: what is not inlined into it is compiled without.
@@ -59,26 +69,23 @@ impl Scratch {
     ) {
         let colour = settings.colour(C).map(|map| map.ready(V::FULL));
         let noise = (settings.noise != Noise::NONE).then(|| settings.noise.ready(settings.key, V::FULL));
-        if settings.is_spatial() || noise.is_some() || colour.is_some() {
-            if settings.is_spatial() {
-                self.take_scene::<V, C>(settings, source.unwrap_or(target), shape);
+        let way = settings.way();
+        if way != Way::Straight || noise.is_some() || colour.is_some() {
+            if way != Way::Straight {
+                self.take_scene::<V, C>(settings, way, source.unwrap_or(target), shape);
             }
-            self.line.resize(shape.width, Pixel::ZERO);
-            let moved = settings.moved();
-            let line = &mut self.line[..shape.width];
-            for y in 0..shape.height {
-                let row = y * shape.width * C..(y + 1) * shape.width * C;
-                if let Some(way) = moved {
-                    self.scene.moved_row(y, way, line);
-                } else if settings.is_warped() {
-                    self.warp.sample(&self.scene, y, line);
-                } else if settings.is_spatial() {
-                    line.copy_from_slice(self.scene.row(y));
-                } else {
-                    load::<V, C>(&source.unwrap_or(target)[row.clone()], line);
+            let rows = band(shape);
+            for start in (0..shape.height).step_by(rows) {
+                let rows = start..shape.height.min(start + rows);
+                let part = start * shape.width * C..rows.end * shape.width * C;
+                self.take_rows::<V, C>(way, rows, &source.unwrap_or(target)[part.clone()], shape);
+                if let Some(colour) = &colour {
+                    colour.apply::<C>(&mut self.line);
                 }
-                shade::<C>(line, colour.as_ref(), noise.as_ref(), (y * shape.width) as u64);
-                store::<V, C>(line, &mut target[row]);
+                if let Some(noise) = &noise {
+                    noise.apply::<C>(&mut self.line, (start * shape.width) as u64);
+                }
+                self.line.store::<V, C>(&mut target[part]);
             }
         } else if let Some(source) = source {
             target.copy_from_slice(source);
@@ -90,26 +97,33 @@ impl Scratch {
 
     /// The image as lens and shift find it.
     #[inline(always)]
-    fn take_scene<V: Value, const C: usize>(&mut self, settings: &Settings, values: &[V], shape: Shape) {
-        self.scene.take::<V, C>(values, shape);
-        settings.blur.apply::<C>(&mut self.scene, &mut self.blurred);
-        if settings.is_warped() {
-            self.scene.surround(settings.border, V::FULL);
-            if settings.moved().is_none() {
-                self.warp.prepare(settings.lens, settings.shift, shape);
-            }
+    fn take_scene<V: Value, const C: usize>(&mut self, settings: &Settings, way: Way, values: &[V], shape: Shape) {
+        self.scene.resize(shape);
+        settings.blur.take::<V, C>(values, &mut self.scene, &mut self.blurred);
+        self.scene.surround::<C>(settings.border, V::FULL);
+        if way == Way::Warped {
+            self.warp.begin(settings.lens, settings.shift, shape, band(shape));
         }
     }
-}
 
-/// What becomes of the pixels of a row where they are, of which the first has the number `first`.
-#[inline(always)]
-fn shade<const C: usize>(line: &mut [Pixel], colour: Option<&Colour>, noise: Option<&Noisy>, first: u64) {
-    // One after the other: a pixel's way through both at once is too long for a processor to work on many pixels.
-    if let Some(colour) = colour {
-        line.iter_mut().for_each(|pixel| *pixel = colour.apply::<C>(*pixel));
-    }
-    if let Some(noise) = noise {
-        line.iter_mut().zip(first..).for_each(|(pixel, at)| *pixel = noise.apply(*pixel, at));
+    /// The light of some rows, of which the image has `values`.
+    #[inline(always)]
+    fn take_rows<V: Value, const C: usize>(&mut self, way: Way, rows: Range<usize>, values: &[V], shape: Shape) {
+        self.line.resize(rows.len() * shape.width);
+        match way {
+            Way::Straight => self.line.take::<V, C>(values),
+            Way::Moved(by) => {
+                self.moved.resize(values.len(), 0.0);
+                for (y, moved) in rows.clone().zip(self.moved.chunks_exact_mut(shape.width * C)) {
+                    self.scene.moved_row::<C>(y, by, moved);
+                }
+                self.line.take::<f32, C>(&self.moved);
+            }
+            Way::Warped => {
+                self.warp.prepare::<C>(rows.clone(), shape);
+                self.warp.sample::<C>(&self.scene, rows, &mut self.seen);
+                self.line.take_pixels(self.seen.as_flattened().as_chunks().0);
+            }
+        }
     }
 }

@@ -27,6 +27,17 @@ pub(super) trait Setting: Sized + PartialEq {
     fn check(&self) -> Result<(), ImageError>;
 }
 
+/// How the light of an image comes to its pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// All light stays where it is.
+    Straight,
+    /// The image, which may be blurred, is moved by whole pixels, to the right and down.
+    Moved([i64; 2]),
+    /// By the map of lens and shift.
+    Warped,
+}
+
 /// The settings of all effects for one image. The same settings make the same image of the same image, to the last bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -91,19 +102,14 @@ impl Settings {
         self.border.check()
     }
 
-    /// Whether pixels get light of other places.
-    pub(super) fn is_spatial(&self) -> bool {
-        self.blur != Blur::NONE || self.is_warped()
-    }
-
-    /// Whether pixels are seen at other places.
-    pub(super) fn is_warped(&self) -> bool {
-        !self.lens.is_ideal() || self.shift != Shift::NONE
-    }
-
-    /// How many whole pixels the image is moved by, where it is moved and nothing more.
-    pub(super) fn moved(&self) -> Option<[i64; 2]> {
-        if self.is_warped() && self.lens.is_ideal() { self.shift.whole() } else { None }
+    /// How light comes to its pixels.
+    pub(super) fn way(&self) -> Way {
+        let whole = self.shift.whole().filter(|_| self.lens.is_ideal());
+        match whole {
+            Some([0, 0]) if self.blur == Blur::NONE => Way::Straight,
+            Some(by) => Way::Moved(by),
+            None => Way::Warped,
+        }
     }
 
     /// The effects of colour on an image of so many channels, if there are any.

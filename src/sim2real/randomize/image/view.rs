@@ -59,9 +59,7 @@ impl Value for u8 {}
 impl Value for f32 {}
 
 pub(super) mod sealed {
-    use wide::{i16x8, i32x8, u8x16};
-
-    use super::super::pixel::Pixel;
+    use super::super::rounding::{lower, nearest_byte, upper};
 
     /// How a value is reckoned with.
     pub trait Value: Copy + Send + Sync + 'static {
@@ -69,8 +67,10 @@ pub(super) mod sealed {
         const FULL: f32;
         /// As a number from 0 to `FULL`.
         fn number(self) -> f32;
-        /// Back from four pixels' numbers, which are cut off at 0 and `FULL`; bytes are rounded to the nearest, halves to even.
-        fn nearest(pixels: &[Pixel; 4]) -> [[Self; 4]; 4];
+        /// Back from a number, which is cut off at 0 and `FULL`; bytes are rounded to the nearest, halves to even.
+        fn nearest(number: f32) -> Self;
+        /// The same for a row of `C` channels.
+        fn store<const C: usize>(channels: [&[f32]; 4], row: &mut [Self]);
         /// Where the first value stands that is none, and what it is.
         fn wrong(values: &[Self]) -> Option<(usize, f32)>;
     }
@@ -84,16 +84,19 @@ pub(super) mod sealed {
         }
 
         #[inline(always)]
-        fn nearest(pixels: &[Pixel; 4]) -> [[Self; 4]; 4] {
-            // Numbers that are too large for a narrower integer become its largest.
-            let pair = |a: Pixel, b: Pixel| {
-                let ([a, b, c, d], [e, f, g, h]) = (a.fast_round_int().to_array(), b.fast_round_int().to_array());
-                i16x8::from_i32x8_saturate(i32x8::new([a, b, c, d, e, f, g, h]))
-            };
-            let bytes = u8x16::narrow_i16x8(pair(pixels[0], pixels[1]), pair(pixels[2], pixels[3])).to_array();
-            let mut four = [[0; 4]; 4];
-            four.as_flattened_mut().copy_from_slice(&bytes);
-            four
+        fn nearest(number: f32) -> Self {
+            nearest_byte(number)
+        }
+
+        #[inline(always)]
+        fn store<const C: usize>(channels: [&[f32]; 4], row: &mut [Self]) {
+            let pixels = row.as_chunks_mut::<C>().0;
+            let channels = channels.map(|channel| &channel[..pixels.len()]);
+            for (x, pixel) in pixels.iter_mut().enumerate() {
+                for (value, channel) in pixel.iter_mut().zip(channels) {
+                    *value = Self::nearest(channel[x]);
+                }
+            }
         }
 
         fn wrong(_values: &[Self]) -> Option<(usize, f32)> {
@@ -110,9 +113,17 @@ pub(super) mod sealed {
         }
 
         #[inline(always)]
-        fn nearest(pixels: &[Pixel; 4]) -> [[Self; 4]; 4] {
-            let cut = |pixel: Pixel| pixel.fast_max(Pixel::ZERO).fast_min(Pixel::ONE).to_array();
-            [cut(pixels[0]), cut(pixels[1]), cut(pixels[2]), cut(pixels[3])]
+        fn nearest(number: f32) -> Self {
+            lower(upper(number, 0.0), 1.0)
+        }
+
+        #[inline(always)]
+        fn store<const C: usize>(channels: [&[f32]; 4], row: &mut [Self]) {
+            for (x, pixel) in row.as_chunks_mut::<C>().0.iter_mut().enumerate() {
+                for (value, channel) in pixel.iter_mut().zip(channels) {
+                    *value = Self::nearest(channel[x]);
+                }
+            }
         }
 
         fn wrong(values: &[Self]) -> Option<(usize, f32)> {
@@ -225,7 +236,7 @@ pub(super) fn check_values<V: Value>(view: &ImageView<'_, V>) -> Result<(), Imag
 
 #[cfg(test)]
 mod tests {
-    use super::super::pixel::Pixel;
+    use super::super::line::Line;
     use super::sealed::Value as _;
     use super::*;
 
@@ -250,20 +261,35 @@ mod tests {
 
     #[test]
     fn bytes_are_rounded_to_the_nearest_and_cut_off() {
-        let nearest = |number: f32| u8::nearest(&[Pixel::splat(number); 4]);
         for byte in 0..=255_u8 {
             let number = f32::from(byte);
             for near in [number, number + 0.49, number - 0.49] {
-                assert_eq!(nearest(near), [[byte; 4]; 4]);
+                assert_eq!(u8::nearest(near), byte);
             }
         }
-        assert_eq!([0.5, 1.5, 2.5, 254.5].map(|number| nearest(number)[1][2]), [0, 2, 2, 254]);
-        assert_eq!([-3.0, 255.6, 1e6, -1e6].map(|number| nearest(number)[3][0]), [0, 255, 255, 0]);
-        // Each number goes to its own place.
-        let places: [[f32; 4]; 4] = std::array::from_fn(|k| std::array::from_fn(|j| (4 * k + j) as f32));
-        assert_eq!(u8::nearest(&places.map(Pixel::from)).as_flattened(), (0..16).collect::<Vec<u8>>());
-        let floats = f32::nearest(&[Pixel::from([-0.1, 0.25, 1.1, 1.0]); 4]);
-        assert_eq!(floats, [[0.0, 0.25, 1.0, 1.0]; 4]);
+        assert_eq!([0.5, 1.5, 2.5, 254.5].map(u8::nearest), [0, 2, 2, 254]);
+        assert_eq!([-3.0, 255.6, 1e6, -1e6].map(u8::nearest), [0, 255, 255, 0]);
+        assert_eq!([-0.1, 0.25, 1.1, 1.0].map(f32::nearest), [0.0, 0.25, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn each_number_of_a_row_goes_to_its_own_place() {
+        fn check<V: Value + PartialEq + std::fmt::Debug, const C: usize>(width: usize, value: fn(usize) -> V) {
+            let row: Vec<V> = (0..width * C).map(value).collect();
+            let mut line = Line::default();
+            line.resize(width);
+            line.take::<V, C>(&row);
+            let mut back = vec![value(0); row.len()];
+            line.store::<V, C>(&mut back);
+            assert_eq!(back, row);
+        }
+        for width in [1, 7, 8, 9, 16, 21] {
+            check::<u8, 1>(width, |at| at as u8);
+            check::<u8, 3>(width, |at| at as u8);
+            check::<u8, 4>(width, |at| at as u8);
+            check::<f32, 3>(width, |at| at as f32 / 64.0);
+            check::<f32, 4>(width, |at| at as f32 / 84.0);
+        }
     }
 
     #[test]
