@@ -2,7 +2,7 @@
 //! platform's own library differ in the last place, and compilers turn them into vector instructions over many numbers, where a
 //! library's is called number by number.
 
-use std::f64::consts::{FRAC_PI_2, LN_2, LOG2_E, SQRT_2};
+use std::f64::consts::{FRAC_PI_2, LOG2_E, SQRT_2};
 
 /// Adding this to a number of less than 2^51 rounds it to a whole one, whose lowest bits are then the lowest of the sum.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
@@ -152,6 +152,8 @@ pub(crate) fn sin_cos(angle: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::LN_2;
+
     use super::*;
 
     #[test]
