@@ -273,6 +273,8 @@ struct Counting<'a> {
 }
 
 impl Visit for Counting<'_> {
+    const KEEPS: bool = false;
+
     #[inline(always)]
     fn visit(&mut self, seen: Seen) {
         let rows = std::array::from_fn(|end| if end < seen.ends { self.steps.row(seen.step, end) } else { None });

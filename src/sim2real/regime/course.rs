@@ -42,36 +42,32 @@ impl<S: PerState> Course<S> {
         Self { joint: begin.clone(), predicted: begin, mass: S::Of::each(|_| 1.0), log: S::Of::each(|_| 0.0) }
     }
 
-    /// Takes the next row, of which `weights` are the densities over the highest. These times what is returned are the density of the row in
-    /// each state over its density given all before; of a state that cannot be the weight may be set to 0. `transition` is that of
+    /// Takes the next row, of which `weights` are the densities over the highest. `transition` is that of
     /// [`Chain`](super::ends::Chain), and `row` tells the row of an end.
     #[inline(always)]
     pub fn step<'a>(
         &mut self,
         model: &HiddenMarkov,
         transition: &[S::Of],
-        weights: &mut S,
+        weights: &S,
         row: impl Fn(usize) -> Option<&'a [f64]>,
-    ) -> S::Of {
+    ) {
         let states = weights.as_ref().len();
         let (joint, predicted) = (self.joint.as_mut(), self.predicted.as_ref());
         for ((joint, weight), before) in joint.iter_mut().zip(weights.as_ref()).zip(predicted) {
             *joint = *weight * *before;
         }
-        let mut mass = total(joint);
-        let mut inverse = self.mass / mass;
-        if mass.below(LEAST) {
-            // Of copies, so that what is seldom needed does not keep the others out of registers.
-            let (mut joint, mut heavier) = (self.joint.clone(), weights.clone());
+        self.mass = total(joint);
+        if self.mass.below(LEAST) {
+            // Of a copy, so that what is seldom needed does not keep the others out of registers.
+            let mut joint = self.joint.clone();
             let rows = std::array::from_fn(|end| if end < S::Of::COUNT { row(end) } else { None });
-            let scaled = rescaled(model, rows, self.mass, &mut joint, &self.predicted.clone(), &mut heavier);
-            (self.joint, *weights) = (joint, heavier);
+            let scaled = rescaled(model, rows, joint.as_mut(), self.predicted.clone().as_ref());
+            self.joint = joint;
             self.log = self.log + scaled.log;
-            (mass, inverse) = (scaled.mass, scaled.inverse);
+            self.mass = scaled.mass;
         }
-        self.mass = mass;
         predict(&transition[..states * states], self.joint.as_ref(), self.predicted.as_mut());
-        inverse
     }
 
     /// Writes the probability of each state given the rows so far.
@@ -121,45 +117,27 @@ struct Scaled<X> {
     mass: X,
     /// Logarithm of what the mass was divided by.
     log: X,
-    inverse: X,
 }
 
 /// Brings masses near 1; where hardly anything is left of one its row is taken again, in logarithms.
 #[cold]
 #[inline(never)]
-fn rescaled<S: PerState>(
-    model: &HiddenMarkov,
-    rows: [Option<&[f64]>; 2],
-    before: S::Of,
-    joint: &mut S,
-    predicted: &S,
-    weights: &mut S,
-) -> Scaled<S::Of> {
-    let mass = total(joint.as_ref());
+fn rescaled<X: Ends>(model: &HiddenMarkov, rows: [Option<&[f64]>; 2], joint: &mut [X], predicted: &[X]) -> Scaled<X> {
+    let mass = total(joint);
     let left = |end: usize| mass.at(end) >= FAINT;
     let exponent = |end: usize| if left(end) { (mass.at(end).to_bits() >> 52) as i64 - 1_023 } else { 0 };
-    let factor = S::Of::each(|end| power_of_two(-exponent(end)));
-    joint.as_mut().iter_mut().for_each(|joint| *joint = *joint * factor);
-    let mut scaled =
-        Scaled { mass: mass * factor, log: S::Of::each(|end| exponent(end) as f64 * LN_2), inverse: before / mass };
-    for end in (0..S::Of::COUNT).filter(|end| !left(*end)) {
-        let log = taken_again(model, rows[end], end, joint.as_mut(), predicted.as_ref(), weights.as_mut());
-        scaled.mass = scaled.mass.with(end, 1.0);
-        scaled.log = scaled.log.with(end, log);
-        scaled.inverse = scaled.inverse.with(end, before.at(end));
+    let factor = X::each(|end| power_of_two(-exponent(end)));
+    joint.iter_mut().for_each(|joint| *joint = *joint * factor);
+    let mut scaled = Scaled { mass: mass * factor, log: X::each(|end| exponent(end) as f64 * LN_2) };
+    for end in (0..X::COUNT).filter(|end| !left(*end)) {
+        let log = taken_again(model, rows[end], end, joint, predicted);
+        scaled = Scaled { mass: scaled.mass.with(end, 1.0), log: scaled.log.with(end, log) };
     }
     scaled
 }
 
 /// Takes a row again, in logarithms; returns that of its density given all before, over the highest.
-fn taken_again<X: Ends>(
-    model: &HiddenMarkov,
-    row: Option<&[f64]>,
-    end: usize,
-    joint: &mut [X],
-    predicted: &[X],
-    weights: &mut [X],
-) -> f64 {
+fn taken_again<X: Ends>(model: &HiddenMarkov, row: Option<&[f64]>, end: usize, joint: &mut [X], predicted: &[X]) -> f64 {
     let mut logs = vec![0.0; joint.len()];
     let row = row.filter(|row| !is_lost(row));
     if let Some(row) = row {
@@ -168,10 +146,8 @@ fn taken_again<X: Ends>(
     logs.iter_mut().zip(predicted).for_each(|(log, before)| *log += before.at(end).ln());
     let peak = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = logs.iter().map(|log| (log - peak).exp()).sum();
-    for (state, log) in logs.iter().enumerate() {
-        let (belief, before) = ((log - peak).exp() / sum, predicted[state].at(end));
-        joint[state] = joint[state].with(end, belief);
-        weights[state] = weights[state].with(end, if before > 0.0 { (belief / before).min(LARGEST) } else { 0.0 });
+    for (joint, log) in joint.iter_mut().zip(logs) {
+        *joint = joint.with(end, (log - peak).exp() / sum);
     }
     peak + sum.ln() - if row.is_some() { model.densities().highest } else { 0.0 }
 }
@@ -188,7 +164,7 @@ fn total<X: Ends>(joint: &[X]) -> X {
 
 /// `next[j] = sum of from[i] transition[i][j]`.
 #[inline(always)]
-fn predict<X: Ends>(transition: &[X], from: &[X], next: &mut [X]) {
+pub(super) fn predict<X: Ends>(transition: &[X], from: &[X], next: &mut [X]) {
     let states = next.len();
     for to in 0..states {
         let mut sum = from[0] * transition[to];

@@ -9,24 +9,14 @@ use super::ends::{Chain, Ends, LANES, PerState, Steps};
 use super::trellis::{self, Seen, Trellis, Visit};
 use super::{HiddenMarkov, Observations, RegimeError};
 
-/// Writes what is believed given the whole series, `[row][state]`.
-struct Written<'a> {
-    steps: Steps<'a>,
-    into: &'a mut [f64],
-}
+/// Asks for nothing but what is believed given the whole series.
+struct Believed;
 
-impl Visit for Written<'_> {
+impl Visit for Believed {
+    const KEEPS: bool = true;
+
     #[inline(always)]
-    fn visit(&mut self, seen: Seen) {
-        let states = seen.posterior.len();
-        for end in 0..seen.ends {
-            let row = self.steps.row_number(seen.step, end);
-            let Some(into) = self.into.get_mut(row * states..(row + 1) * states) else { continue };
-            for (into, posterior) in into.iter_mut().zip(seen.posterior) {
-                *into = posterior.at(end);
-            }
-        }
-    }
+    fn visit(&mut self, _: Seen) {}
 }
 
 impl HiddenMarkov {
@@ -46,11 +36,11 @@ impl HiddenMarkov {
     /// A series of another width than the model's.
     pub fn smooth(&self, series: Observations) -> Result<Vec<f64>, RegimeError> {
         self.check(series)?;
-        let mut posterior = vec![0.0; series.len() * self.states()];
         let mut trellis = Trellis::default();
         trellis.forward(self, series);
-        trellis.backward(self, &mut Written { steps: Steps::of::<f64x2>(series), into: &mut posterior });
-        Ok(posterior)
+        trellis.backward(self, &mut Believed);
+        trellis.beliefs.truncate(series.len() * self.states());
+        Ok(trellis.beliefs)
     }
 
     /// The likeliest path of states given the whole series, and the logarithm of its density with the series (A. J. Viterbi,

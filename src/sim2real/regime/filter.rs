@@ -116,7 +116,7 @@ impl Filter {
 fn take<S: PerState<Of = f64>>(course: &mut Course<S>, model: &HiddenMarkov, row: &[f64], belief: &mut [f64]) {
     let mut weights = S::of(model.states(), |_| 0.0);
     model.densities().weights(row, weights.as_mut());
-    course.step(model, model.transition(), &mut weights, |_| Some(row));
+    course.step(model, model.transition(), &weights, |_| Some(row));
     course.believe(belief);
 }
 

@@ -5,6 +5,7 @@
 use wide::f64x2;
 
 use super::course::LARGEST;
+use super::ends::Ends;
 use super::observations::is_lost;
 use super::trellis::{Arrivals, Seen, Visit};
 use super::{HiddenMarkov, Observations};
@@ -118,8 +119,11 @@ impl Trellis {
         Self { beliefs, ratios, log_likelihood }
     }
 
-    /// The recursion backward: shows `visitor` each row, the last first.
-    pub fn sweep(&self, model: &HiddenMarkov, visitor: &mut impl Visit) {
+    /// The recursion backward: shows `visitor` each row, the last first, and writes what is kept into `into`.
+    pub fn sweep<V: Visit>(&self, model: &HiddenMarkov, into: &mut Vec<f64>, visitor: &mut V) {
+        if V::KEEPS {
+            into.resize(self.beliefs.len(), 0.0);
+        }
         let (transition, states) = (model.transition(), model.states());
         let (mut beta, mut ahead) = (vec![0.0; states], vec![0.0; states]);
         let (mut logs, mut posterior, mut each) = (vec![0.0; states], vec![f64x2::ZERO; states], vec![0.0; states * states]);
@@ -142,6 +146,9 @@ impl Trellis {
                 None => Arrivals::None,
             };
             visitor.visit(Seen { step: row, ends: 1, arrivals, posterior: &posterior });
+            if V::KEEPS {
+                into[row * states..].iter_mut().zip(&posterior).for_each(|(into, posterior)| *into = posterior.at(0));
+            }
             for (from, beta) in beta.iter_mut().enumerate() {
                 *beta = sum((0..states).map(|to| transition[from * states + to].ln() + ahead[to]));
             }

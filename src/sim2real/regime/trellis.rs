@@ -2,7 +2,7 @@
 
 use wide::f64x2;
 
-use super::course::{Course, LARGEST, Meeting};
+use super::course::{Course, LARGEST, Meeting, predict};
 use super::densities::{Block, Evaluated, each_block};
 use super::ends::{Chain, Ends, PerState, Steps};
 use super::{HiddenMarkov, Observations, in_logs};
@@ -23,7 +23,7 @@ pub(super) fn follow(model: &HiddenMarkov, series: Observations, see: impl FnMut
 #[inline(always)]
 fn follow_of<S: PerState<Of = f64>>(model: &HiddenMarkov, series: Observations, mut see: impl FnMut(&[f64])) {
     let mut belief = S::of(model.states(), |_| 0.0);
-    run::<S>(model, series, |_, course, _, _| {
+    run::<S>(model, series, |course| {
         course.believe(belief.as_mut());
         see(belief.as_ref());
     });
@@ -45,16 +45,12 @@ pub(super) fn log_likelihood(model: &HiddenMarkov, series: Observations) -> f64 
 }
 
 fn met<S: PerState<Of = f64x2>>(model: &HiddenMarkov, series: Observations) -> Option<Meeting> {
-    run::<S>(model, series, |_, _, _, _| ()).meet(model, series.observed())
+    run::<S>(model, series, |_| ()).meet(model, series.observed())
 }
 
-/// Runs over a series; `see` is shown each step, where the recursion is then, the step's weights, and what makes ratios of them.
+/// Runs over a series; `see` is shown where the recursion is after each step.
 #[inline(always)]
-fn run<S: PerState>(
-    model: &HiddenMarkov,
-    series: Observations,
-    mut see: impl FnMut(usize, &Course<S>, &S, S::Of),
-) -> Course<S> {
+fn run<S: PerState>(model: &HiddenMarkov, series: Observations, mut see: impl FnMut(&Course<S>)) -> Course<S> {
     let (chain, steps) = (Chain::of(model), Steps::of::<S::Of>(series));
     let mut course = Course::new(&chain.begin);
     each_block(model, Evaluated::Weights, steps, |block| advance(&block, steps, &chain, &mut course, &mut see));
@@ -68,12 +64,12 @@ fn advance<S: PerState>(
     steps: Steps,
     chain: &Chain<S::Of>,
     from: &mut Course<S>,
-    mut see: impl FnMut(usize, &Course<S>, &S, S::Of),
+    mut see: impl FnMut(&Course<S>),
 ) {
     let mut course = from.clone();
     block.each_step::<S>(|step, weights| {
-        let inverse = course.step(chain.model, &chain.transition, weights, |end| steps.row(step, end));
-        see(step, &course, weights, inverse);
+        course.step(chain.model, &chain.transition, weights, |end| steps.row(step, end));
+        see(&course);
     });
     *from = course;
 }
@@ -104,6 +100,9 @@ pub(super) enum Arrivals<'a> {
 
 /// Who is shown what is known by [`Trellis::backward`]: a trait, because its method can be told to be inlined.
 pub(super) trait Visit {
+    /// Whether what is believed given the whole series takes the place of what was believed without what follows.
+    const KEEPS: bool;
+
     /// Takes what is known of a step's rows.
     fn visit(&mut self, seen: Seen);
 }
@@ -111,10 +110,12 @@ pub(super) trait Visit {
 /// What the first recursions found, step after step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Trellis {
-    /// Probability of each state given the rows up to this one, `[step][state]`.
-    beliefs: Vec<f64x2>,
-    /// Density of the row in each state over its density given all before, `[step][state]`.
-    ratios: Vec<f64x2>,
+    /// Probability of each state given the rows up to this one, `[row][state]`, with the row behind the series where there is one.
+    pub beliefs: Vec<f64>,
+    /// Number of steps.
+    count: usize,
+    /// Whether there is a row behind the series.
+    uneven: bool,
     /// Of each half, for each state of its last row as it is come by, how much more likely the other half is than it was given this one.
     beyond: Vec<f64x2>,
     /// What was found in logarithms, where the recursions do not meet.
@@ -148,62 +149,75 @@ impl Trellis {
 
     fn forward_of<S: PerState<Of = f64x2>>(&mut self, model: &HiddenMarkov, series: Observations) -> Option<Meeting> {
         let (states, steps) = (model.states(), Steps::of::<f64x2>(series));
-        self.beliefs.resize(steps.count * states, f64x2::ZERO);
-        self.ratios.resize(steps.count * states, f64x2::ZERO);
-        let mut places = self.beliefs.chunks_exact_mut(states).zip(self.ratios.chunks_exact_mut(states));
-        let course = run::<S>(model, series, |_, course, weights, inverse| {
-            let Some((belief, ratios)) = places.next() else { return };
-            for (ratio, weight) in ratios.iter_mut().zip(weights.as_ref()) {
-                *ratio = *weight * inverse;
-            }
-            course.believe(belief);
+        (self.count, self.uneven) = (steps.count, steps.uneven());
+        self.beliefs.resize(2 * steps.count * states, 0.0);
+        let (first, last) = self.beliefs.split_at_mut(steps.count * states);
+        let mut places = first.chunks_exact_mut(states).zip(last.rchunks_exact_mut(states));
+        let mut believed = S::of(states, |_| f64x2::ZERO);
+        let course = run::<S>(model, series, |course| {
+            let Some((first, last)) = places.next() else { return };
+            course.believe(believed.as_mut());
+            write(believed.as_ref(), first, last);
         });
-        if steps.uneven() {
-            // Nothing came from a row that is not there.
-            self.beliefs.iter_mut().take(states).for_each(|belief| *belief = belief.with(1, 0.0));
-        }
         course.meet(model, series.observed())
     }
 
     /// Runs on from where the ends met to the ends, over what was found there, and shows `visitor` each step, the last first.
-    pub fn backward(&self, model: &HiddenMarkov, visitor: &mut impl Visit) {
+    pub fn backward(&mut self, model: &HiddenMarkov, visitor: &mut impl Visit) {
         match model.states() {
-            _ if self.in_logs.is_some() => self.in_logs.iter().for_each(|found| found.sweep(model, visitor)),
-            2 => self.sweep::<[f64x2; 2]>(model, visitor),
-            3 => self.sweep::<[f64x2; 3]>(model, visitor),
-            4 => self.sweep::<[f64x2; 4]>(model, visitor),
-            _ => self.sweep::<Vec<f64x2>>(model, visitor),
+            _ if self.in_logs.is_some() => {
+                let beliefs = &mut self.beliefs;
+                self.in_logs.iter().for_each(|found| found.sweep(model, beliefs, visitor));
+            }
+            2 => self.sweep::<[f64x2; 2], _>(model, visitor),
+            3 => self.sweep::<[f64x2; 3], _>(model, visitor),
+            4 => self.sweep::<[f64x2; 4], _>(model, visitor),
+            _ => self.sweep::<Vec<f64x2>, _>(model, visitor),
         }
     }
 
     /// The second recursion, against the first.
     #[inline(always)]
-    fn sweep<S: PerState<Of = f64x2>>(&self, model: &HiddenMarkov, visitor: &mut impl Visit) {
+    fn sweep<S: PerState<Of = f64x2>, V: Visit>(&mut self, model: &HiddenMarkov, visitor: &mut V) {
         let Chain { transition, begin, .. } = Chain::<f64x2>::of(model);
         let states = begin.len();
         let mut beta = S::of(states, |state| self.beyond[state]);
-        let (mut posterior, mut ahead) = (beta.clone(), beta.clone());
+        let (mut posterior, mut ahead, mut belief) = (beta.clone(), beta.clone(), beta.clone());
+        let (mut before, mut predicted) = (beta.clone(), beta.clone());
         let (beta, posterior, ahead) = (beta.as_mut(), posterior.as_mut(), ahead.as_mut());
         let (states, transition) = (beta.len(), &transition[..beta.len() * beta.len()]);
-        for step in (0..self.ratios.len() / states).rev() {
-            let (belief, ratio) = (&self.beliefs[step * states..][..states], &self.ratios[step * states..][..states]);
-            let before = step.checked_sub(1).map(|before| &self.beliefs[before * states..][..states]);
+        let (first, last) = self.beliefs.split_at_mut(self.count * states);
+        if self.count > 0 {
+            read(before.as_mut(), &first[(self.count - 1) * states..], &last[..states]);
+        }
+        for step in (0..self.count).rev() {
+            let (here, there) = (step * states, (self.count - 1 - step) * states);
+            belief.as_mut().copy_from_slice(before.as_ref());
+            if step > 0 {
+                read(before.as_mut(), &first[here - states..], &last[there + states..]);
+            }
+            // Densities of the row in each state, over that given all before, are how much more is believed than was expected: of a
+            // model that mixes something was expected of every state.
+            predict(transition, before.as_ref(), predicted.as_mut());
             let mut sum = f64x2::ZERO;
-            for state in 0..states {
-                posterior[state] = belief[state] * beta[state];
-                ahead[state] = ratio[state] * beta[state];
+            for ((state, belief), expected) in belief.as_ref().iter().enumerate().zip(predicted.as_ref()) {
+                posterior[state] = *belief * beta[state];
+                ahead[state] = posterior[state] / *expected;
                 sum += posterior[state];
             }
-            // No number of a row behind the series, which nobody is shown.
             let inverse = f64x2::ONE / sum;
             for probability in posterior.iter_mut() {
                 *probability *= inverse;
             }
-            let arrivals = match before {
-                Some(before) => Arrivals::Products { before, ahead },
-                None => Arrivals::None,
-            };
+            if self.uneven && step == 1 {
+                // Nothing came from a row that is not there.
+                before.as_mut().iter_mut().for_each(|before| *before = before.with(1, 0.0));
+            }
+            let arrivals = if step > 0 { Arrivals::Products { before: before.as_ref(), ahead } } else { Arrivals::None };
             visitor.visit(Seen { step, ends: 2, posterior, arrivals });
+            if V::KEEPS {
+                write(posterior, &mut first[here..], &mut last[there..]);
+            }
             for from in 0..states {
                 let mut product = transition[from * states] * ahead[0];
                 for to in 1..states {
@@ -212,5 +226,21 @@ impl Trellis {
                 beta[from] = product.at_most(LARGEST);
             }
         }
+    }
+}
+
+/// Writes numbers of a step to where its two rows are.
+#[inline(always)]
+fn write(numbers: &[f64x2], first: &mut [f64], last: &mut [f64]) {
+    for ((number, first), last) in numbers.iter().zip(first).zip(last) {
+        [*first, *last] = number.to_array();
+    }
+}
+
+/// Reads them from there.
+#[inline(always)]
+fn read(numbers: &mut [f64x2], first: &[f64], last: &[f64]) {
+    for ((number, first), last) in numbers.iter_mut().zip(first).zip(last) {
+        *number = f64x2::from([*first, *last]);
     }
 }
