@@ -10,7 +10,7 @@ use textbook::{Textbook, log_density};
 use trueup::sim2real::Seed;
 use trueup::sim2real::regime::{
     Assumed, Collapse, Cost, Degrees, Division, Emission, Family, Filter, HiddenMarkov, Observations, Penalty, Prior,
-    RegimeError, RunLengths, Settings, Spread, fit, fit_states, refit,
+    RegimeError, RunLengths, Settings, Spread, fit, fit_states, kolmogorov_smirnov, refit, wasserstein,
 };
 
 /// Annual flow of the Nile at Aswan, 1871 to 1970 [1e8 m³]: G. W. Cobb, *The problem of the Nile*, Biometrika 65 (1978); the data
@@ -327,6 +327,13 @@ fn the_nile_fell_in_1899() {
     let high = usize::from(found.model.emissions()[1].mean > found.model.emissions()[0].mean);
     assert!(path[..LOWER].iter().filter(|s| **s == high).count() >= 26, "{path:?}");
     assert!(path[LOWER..].iter().filter(|s| **s == high).count() <= 3, "{path:?}");
+    // The years before and those from then on are of two distributions: distances and probability are those of SciPy 1.17.
+    let (before, after) = NILE.split_at(LOWER);
+    let gap = kolmogorov_smirnov(before, after).unwrap();
+    assert!((gap.distance - 0.706_349_206_349_206_4).abs() < 1e-12, "{gap:?}");
+    assert!((gap.p_value / 2.766_220_702_94e-10 - 1.0).abs() < 1e-6, "{gap:?}");
+    let moved = wasserstein(before, after, 999, Seed(1)).unwrap();
+    assert!((moved.distance - 247.777_777_777_777_77).abs() < 1e-9 && moved.p_value == 1e-3, "{moved:?}");
 }
 
 #[test]
