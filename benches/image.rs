@@ -1,9 +1,9 @@
 //! What a randomized image costs on one thread: 84 x 84 x 3, the size of DrQ, effect by effect and all of them. Beside it in
 //! the same run a copy of the bytes, and a plain loop that adds a number to each of them.
 //!
-//! Once measured on a thread of an AMD EPYC (Zen 3), nothing else running, the fastest of 60 batches of 64 images [us per image]: copy
-//! 0.6; all but blur and shift 37; all ten effects while lens and shift are held 42, and 48 where each image has a map of its own
-//! (means in this bench 43 to 46, and 49 to 54).
+//! Once measured on a thread of an AMD EPYC (Zen 3), the fastest of 120 batches of 64 images [us per image]: all ten effects 43.6 where each
+//! image has a map of its own, 36.8 while lens and shift are held; before images went through in bands, 49.8 and 43.0 in the same run. In an
+//! hour in which others use the machine means of this bench are half as large again.
 #![allow(missing_docs, clippy::expect_used, reason = "a bench has no users, and ends where the registry lacks a row")]
 
 use std::hint::black_box;
