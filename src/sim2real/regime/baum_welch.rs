@@ -5,7 +5,7 @@ use serde::Serialize;
 use wide::f64x2;
 
 use super::densities::Densities;
-use super::ends::{Ends, Steps};
+use super::ends::{Ends, LANES, Steps};
 use super::moments::Moments;
 use super::observations::is_lost;
 use super::starts;
@@ -268,8 +268,38 @@ struct Counting<'a> {
     expected: &'a mut Expected,
     /// Of transitions, from either end, as they are come by.
     transition: &'a mut [f64x2],
-    steps: Steps<'a>,
+    series: Observations<'a>,
     densities: &'a Densities,
+    /// Of the steps of a block: what is believed, `[state][step][end]`, and room for the rows, `[column][step][end]`.
+    block: [Vec<[f64; LANES]>; 2],
+}
+
+impl Counting<'_> {
+    /// Keeps what is believed of a step's rows until all of a block are known, and adds these to the moments.
+    #[inline(always)]
+    fn keep(&mut self, seen: &Seen) {
+        let [believed, _] = &mut self.block;
+        let place = seen.step % (LANES / seen.ends);
+        for (believed, posterior) in believed.iter_mut().zip(seen.posterior) {
+            let kept = &mut believed[place * seen.ends..][..seen.ends];
+            kept.copy_from_slice(&posterior.as_array_ref()[..seen.ends]);
+        }
+        if place == 0 {
+            // The first step of a block is come by last.
+            self.add(seen.step, seen.ends);
+        }
+    }
+
+    #[inline(never)]
+    fn add(&mut self, from: usize, ends: usize) {
+        let [believed, columns] = &mut self.block;
+        if ends == 1 {
+            Steps::of::<f64>(self.series).columns::<f64>(from, columns);
+        } else {
+            Steps::of::<f64x2>(self.series).columns::<f64x2>(from, columns);
+        }
+        self.expected.moments.add(columns, believed, self.densities);
+    }
 }
 
 impl Visit for Counting<'_> {
@@ -277,8 +307,7 @@ impl Visit for Counting<'_> {
 
     #[inline(always)]
     fn visit(&mut self, seen: Seen) {
-        let rows = std::array::from_fn(|end| if end < seen.ends { self.steps.row(seen.step, end) } else { None });
-        self.expected.moments.add(rows, seen.posterior, Some(self.densities));
+        self.keep(&seen);
         let states = seen.posterior.len();
         let transition = &mut self.transition[..states * states];
         match seen.arrivals {
@@ -307,8 +336,9 @@ impl Expected {
             trellis.forward(model, *part);
             expected.log_likelihood += trellis.log_likelihood;
             expected.transition.iter_mut().zip(&trellis.crossing).for_each(|(sum, count)| *sum += count);
-            let (steps, densities) = (Steps::of::<f64x2>(*part), model.densities());
-            let mut counting = Counting { expected: &mut expected, transition: &mut transition, steps, densities };
+            let densities = model.densities();
+            let block = [states, model.width()].map(|count| vec![[0.0; LANES]; count]);
+            let mut counting = Counting { expected: &mut expected, transition: &mut transition, series: *part, densities, block };
             trellis.backward(model, &mut counting);
         }
         for (k, sum) in expected.transition.iter_mut().enumerate() {

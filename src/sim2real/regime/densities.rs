@@ -95,7 +95,7 @@ impl Densities {
 
     /// The same of rows side by side, `[column][row]`.
     #[inline(always)]
-    fn distances<const N: usize>(&self, state: usize, columns: &[[f64; N]]) -> [f64; N] {
+    pub fn distances<const N: usize>(&self, state: usize, columns: &[[f64; N]]) -> [f64; N] {
         let means = &self.means[state * self.width..][..self.width];
         let mut sums = [0.0; N];
         if self.triangular {
@@ -194,7 +194,7 @@ fn squared(x: f64) -> f64 {
 
 /// No squared distance is above `FARTHEST`; nor is that of a difference of infinities, which is NaN.
 #[inline(always)]
-fn bounded(distance: f64) -> f64 {
+pub(super) fn bounded(distance: f64) -> f64 {
     if distance < FARTHEST { distance } else { FARTHEST }
 }
 

@@ -200,20 +200,39 @@ impl<'a> Steps<'a> {
         let place = |step: usize, end: usize| (step * X::COUNT + end) % LANES;
         let first = self.series.slice(from, to);
         let last = self.series.slice(X::COUNT * self.count - to, X::COUNT * self.count - from);
-        if let ([column], 2) = (&mut *into, X::COUNT) {
-            // Most series have one column: both rows of a step are written at once.
-            let (pairs, _) = column.as_chunks_mut::<2>();
-            if let ([pair, ..], [x, ..]) = (&mut *pairs, &first.values()[..alone]) {
-                pair[0] = *x;
+        if X::COUNT == 2 {
+            match self.series.width() {
+                1 => return both_of::<1>([first, last], alone, into),
+                2 => return both_of::<2>([first, last], alone, into),
+                3 => return both_of::<3>([first, last], alone, into),
+                4 => return both_of::<4>([first, last], alone, into),
+                _ => {}
             }
-            let rows = first.values()[alone..].iter().zip(last.values().iter().rev());
-            pairs[alone..].iter_mut().zip(rows).for_each(|(pair, (first, last))| *pair = [*first, *last]);
-            return;
         }
         let mut write = |place: usize, row: &[f64]| into.iter_mut().zip(row).for_each(|(column, x)| column[place] = *x);
         first.iter().enumerate().for_each(|(step, row)| write(place(step, 0), row));
         if X::COUNT > 1 {
             last.iter().rev().enumerate().for_each(|(step, row)| write(place(alone + step, 1), row));
+        }
+    }
+}
+
+/// Writes rows from both ends, the last of the second first; of the first `alone` rows there is no second. Most series have few columns:
+/// where their number is known both rows of a step are written at once.
+fn both_of<const W: usize>([first, last]: [Observations; 2], alone: usize, into: &mut [[f64; LANES]]) {
+    let ([columns, ..], (first, _), (last, _)) =
+        (into.as_chunks_mut::<W>().0, first.values().as_chunks::<W>(), last.values().as_chunks::<W>())
+    else {
+        return;
+    };
+    let (single, first) = first.split_at(alone.min(first.len()));
+    for (k, column) in columns.iter_mut().enumerate() {
+        let (begin, steps) = column.as_chunks_mut::<2>().0.split_at_mut(alone);
+        for (step, row) in begin.iter_mut().zip(single) {
+            step[0] = row[k];
+        }
+        for ((step, first), last) in steps.iter_mut().zip(first).zip(last.iter().rev()) {
+            *step = [first[k], last[k]];
         }
     }
 }

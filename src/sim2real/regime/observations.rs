@@ -82,9 +82,10 @@ impl<'a> Observations<'a> {
     /// Number of rows that were not lost.
     #[must_use]
     pub fn observed(&self) -> usize {
-        // Of one column several values at once.
-        if self.width == 1 {
-            return self.values.iter().map(|x| usize::from(!x.is_nan())).sum();
+        // Several values at once; seldom is one lost, and of one column that says it all.
+        let lost: usize = self.values.iter().map(|x| usize::from(x.is_nan())).sum();
+        if lost == 0 || self.width == 1 {
+            return self.len() - lost;
         }
         self.iter().filter(|row| !is_lost(row)).count()
     }

@@ -1,7 +1,6 @@
 //! Where a fit begins: guesses of which rows are of which state.
 
 use rand::RngExt;
-use wide::f64x2;
 
 use super::moments::Moments;
 use super::observations::is_lost;
@@ -158,7 +157,6 @@ fn model(series: &[Observations], labels: &[usize], settings: &Settings, varianc
     let means = group_means(series, labels, states);
     let mut moments = Moments::new(means, variances.len(), settings.family);
     let mut label = labels.iter();
-    let mut one = vec![f64x2::ZERO; states];
     for part in series {
         let mut before = None;
         for row in part.iter() {
@@ -171,9 +169,7 @@ fn model(series: &[Observations], labels: &[usize], settings: &Settings, varianc
                 let row: &mut Vec<f64> = &mut counts[before];
                 row[now] += 1.0;
             }
-            one.fill(f64x2::ZERO);
-            one[now] = f64x2::from([1.0, 0.0]);
-            moments.add([Some(row), None], &one, None);
+            moments.add_row(row, now);
         }
     }
     // A start must leave every state some width to grow from.
