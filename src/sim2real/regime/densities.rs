@@ -146,30 +146,33 @@ impl Densities {
             Unit::Natural => (0.0, 1.0),
             Unit::Bits => (self.highest, LOG2_E),
         };
-        // First squared distances. Most series have one column: no more is done than must be.
-        if let [column] = columns {
-            for ((logs, mean), whitening) in into.iter_mut().zip(&self.means).zip(&self.whitening) {
-                for k in 0..N {
-                    logs[k] = bounded(squared(whitening * (column[k] - mean)));
+        let scaled = |state: usize| ((self.peaks[state] - less) * size, 0.5 * size);
+        match (columns, &self.degrees) {
+            ([column], None) => {
+                // Most series are such: no more is done than must be.
+                for (state, logs) in into.iter_mut().enumerate() {
+                    let ((top, half), mean) = (scaled(state), self.means[state]);
+                    let whitening = self.whitening[state] * half.sqrt();
+                    for k in 0..N {
+                        logs[k] = top - bounded(squared(whitening * (column[k] - mean)));
+                    }
                 }
             }
-        } else {
-            for (state, logs) in into.iter_mut().enumerate() {
-                *logs = self.distances(state, columns);
-            }
-        }
-        if let Some(degrees) = &self.degrees {
-            for ((logs, peak), nu) in into.iter_mut().zip(&self.peaks).zip(degrees) {
-                let (top, half) = ((peak - less) * size, 0.5 * (nu + self.width as f64) * size);
-                for log in logs {
-                    *log = top - half * ln_1p(bounded(*log / nu));
+            (_, None) => {
+                for (state, logs) in into.iter_mut().enumerate() {
+                    let ((top, half), distances) = (scaled(state), self.distances(state, columns));
+                    for k in 0..N {
+                        logs[k] = top - half * distances[k];
+                    }
                 }
             }
-        } else {
-            for (logs, peak) in into.iter_mut().zip(&self.peaks) {
-                let (top, half) = ((peak - less) * size, 0.5 * size);
-                for log in logs {
-                    *log = top - half * *log;
+            (_, Some(degrees)) => {
+                for ((state, logs), nu) in into.iter_mut().enumerate().zip(degrees) {
+                    let ((top, half), distances) = (scaled(state), self.distances(state, columns));
+                    let half = half * (nu + self.width as f64);
+                    for k in 0..N {
+                        logs[k] = top - half * ln_1p(bounded(distances[k] / nu));
+                    }
                 }
             }
         }
@@ -247,9 +250,14 @@ pub(super) fn each_block<X: Ends>(model: &HiddenMarkov, evaluated: Evaluated, st
     for from in (0..steps.count).step_by(size) {
         steps.columns::<X>(from, &mut columns);
         let into = bytemuck::cast_slice_mut(&mut values);
-        Arch::new().dispatch(Evaluation { densities, evaluated, columns: &columns, into });
+        evaluate(densities, evaluated, &columns, into);
         see(Block { from, count: size.min(steps.count - from), values: bytemuck::cast_slice(&values) });
     }
+}
+
+/// Evaluates rows side by side, `[column][row]`, in each state, `[state][row]`.
+pub(super) fn evaluate(densities: &Densities, evaluated: Evaluated, columns: &[[f64; LANES]], into: &mut [[f64; LANES]]) {
+    Arch::new().dispatch(Evaluation { densities, evaluated, columns, into });
 }
 
 struct Evaluation<'a> {

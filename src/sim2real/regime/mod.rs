@@ -31,8 +31,10 @@ mod run_length;
 mod runs;
 mod settings;
 mod starts;
+mod strands;
 mod trellis;
 mod two_sample;
+mod viterbi;
 
 pub use baum_welch::{Collapse, Fit, fit, fit_states, refit};
 pub use cusum::{Alarm, Cusum, CusumSettings, Shift};

@@ -180,11 +180,11 @@ impl NullaryFnOnce for Addition<'_> {
     fn call(self) {
         let Self { moments, columns, probabilities, densities } = self;
         let width = moments.width;
-        let mut here = [1.0; LANES];
+        let mut here = [true; LANES];
         for column in columns.iter_mut() {
             for k in 0..LANES {
                 let lost = column[k].is_nan();
-                here[k] = if lost { 0.0 } else { here[k] };
+                here[k] &= !lost;
                 // Nothing times what is no number would be no number either.
                 column[k] = if lost { 0.0 } else { column[k] };
             }
@@ -192,7 +192,7 @@ impl NullaryFnOnce for Addition<'_> {
         let (mut kept, mut weights) = ([0.0; LANES], [0.0; LANES]);
         for (state, probabilities) in probabilities.iter().enumerate() {
             for k in 0..LANES {
-                kept[k] = probabilities[k] * here[k];
+                kept[k] = if here[k] { probabilities[k] } else { 0.0 };
             }
             add_products(&mut moments.rows[state], &kept, &[1.0; LANES]);
             if let Some(degrees) = &densities.degrees {
