@@ -1,7 +1,7 @@
 """Holds regimes to hmmlearn, ruptures: the same series, the same answers, and how long each takes.
 
     cargo run --release --example regime_check -- out/regimes >out/regimes/trueup.json
-    python checks/regime_check.py out/regimes >reports/regimes.md
+    python checks/regime_check.py out/regimes target/release/examples/regime_check >reports/regimes.md
 
 Hidden Markov models: with the same parameters the same log-likelihood, path and posterior; a fit of each, of which trueup's must
 be no less likely. Change points: the same cost, penalty and least length, the same rows. Exit code 1 where a row is not so.
@@ -10,6 +10,7 @@ be no less likely. Change points: the same cost, penalty and least length, the s
 import csv
 import json
 import logging
+import subprocess
 import sys
 import time
 from importlib.metadata import version
@@ -19,8 +20,8 @@ import numpy as np
 import ruptures
 from hmmlearn.hmm import GaussianHMM
 
-ROUNDS = 5
-SECONDS = 2.0
+ROUNDS = 31
+SECONDS = 0.05
 
 
 def read(path):
@@ -28,14 +29,36 @@ def read(path):
         return np.array([[float(cell) for cell in row] for row in list(csv.reader(file))[1:]])
 
 
-def timed(run, rounds=ROUNDS):
-    """What `run` gives, and the least and the most seconds it takes, of `rounds` and of SECONDS at least."""
+class Turns:
+    """Times both sides by turns, so that a slow minute of the machine is one of both."""
+
+    def __init__(self, program, table):
+        self.ours = subprocess.Popen([program, "--timed"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.table = table
+
+    def tell(self, what, rows, asked, run, times=1, rounds=ROUNDS):
+        """Adds a row: seconds of ours, which is `asked` for, and of `run`, which does its own so many `times`."""
+        pairs = [(self.of_ours(asked), least(run) / times) for _ in range(rounds)]
+        ratios = np.array([theirs / ours for ours, theirs in pairs])
+        low, middle, high = np.quantile(ratios, [0.1, 0.5, 0.9])
+        ours, theirs = np.median(pairs, axis=0)
+        spread = f"{middle:.0f} ({low:.0f} to {high:.0f})" if rounds > 1 else f"{middle:.0f}"
+        self.table.append(f"| {what} | {rows:,} | {duration(ours)} | {duration(theirs)} | {spread} |")
+
+    def of_ours(self, asked):
+        self.ours.stdin.write(asked + "\n")
+        self.ours.stdin.flush()
+        return float(self.ours.stdout.readline())
+
+
+def least(run):
+    """The least seconds that `run` takes, of as many times as there is time for."""
     took = []
-    while len(took) < rounds or sum(took) < SECONDS:
+    while sum(took) < SECONDS:
         started = time.perf_counter()
-        given = run()
+        run()
         took.append(time.perf_counter() - started)
-    return given, (min(took), max(took))
+    return min(took)
 
 
 def peer(model, full, **settings):
@@ -63,30 +86,20 @@ def peer(model, full, **settings):
 
 
 def duration(seconds):
-    least, most = seconds
-    unit, scale = ("s", 1) if least >= 1 else ("ms", 1e3) if least >= 1e-3 else ("µs", 1e6)
-    return f"{least * scale:.3g} to {most * scale:.3g} {unit}"
+    unit, scale = ("s", 1) if seconds >= 1 else ("ms", 1e3) if seconds >= 1e-3 else ("µs", 1e6)
+    return f"{seconds * scale:.3g} {unit}"
 
 
-def speeds(name, rows, ours, theirs, table):
-    ratio = theirs[0] / ours[0]
-    table.append(f"| {name} | {rows:,} | {duration(ours)} | {duration(theirs)} | {ratio:.0f} |")
-    return ratio
-
-
-def hidden_markov(case, series, table, fast):
+def hidden_markov(case, series, table, turns):
     """A row of the table, and what is wrong with it."""
     made, wrong = peer(case["model"], case["full"]), []
-    log, scored = timed(lambda: made.score(series))
-    (path_log, path), decoded = timed(lambda: made.decode(series))
-    posterior, smoothed = timed(lambda: made.predict_proba(series))
+    log = made.score(series)
+    path_log, path = made.decode(series)
+    posterior = made.predict_proba(series)
     relative = abs(log - case["log_likelihood"]) / abs(log)
     path_relative = abs(path_log - case["path_log"]) / abs(path_log)
     agree = float(np.mean(path == np.array(case["path"])))
     apart = float(np.max(np.abs(posterior[:, 0] - np.array(case["posterior"]))))
-    # Twenty iterations from the same parameters.
-    learner = peer(case["model"], case["full"], init_params="", n_iter=20, tol=-np.inf)
-    rounds = [timed(lambda: learner.fit(series), 1)[1][0] / 20 for _ in range(ROUNDS)]
     # From the true parameters, so that the peer has the best start there is.
     learner = peer(case["model"], case["full"], init_params="", n_iter=1000, tol=1e-9 * len(series))
     learner.fit(series)
@@ -105,13 +118,15 @@ def hidden_markov(case, series, table, fast):
         f"| {case['series']} | {relative:.0e} | {100 * agree:.2f} % | {apart:.0e} | {ours:.3f} | {theirs:.3f} "
         f"| {100 * fitted:.2f} % |"
     )
-    for name, ours, theirs in (
-        ("log-likelihood", case["seconds"]["log_likelihood"], scored),
-        ("Viterbi", case["seconds"]["viterbi"], decoded),
-        ("posterior", case["seconds"]["posterior"], smoothed),
-        ("an iteration of Baum-Welch", case["seconds"]["iteration"], (min(rounds), max(rounds))),
+    # Twenty iterations, of which each costs the same.
+    learner = peer(case["model"], case["full"], init_params="", n_iter=20, tol=-np.inf)
+    for name, asked, run, times in (
+        ("log-likelihood", "log_likelihood", lambda: made.score(series), 1),
+        ("Viterbi", "viterbi", lambda: made.decode(series), 1),
+        ("posterior", "posterior", lambda: made.predict_proba(series), 1),
+        ("an iteration of Baum-Welch", "iteration", lambda: learner.fit(series), 20),
     ):
-        speeds(f"{case['series']}: {name}, hmmlearn", case["rows"], ours, theirs, fast)
+        turns.tell(f"{case['series']}: {name}, hmmlearn", case["rows"], f"{case['series']} {asked}", run, times)
     return wrong
 
 
@@ -133,13 +148,13 @@ class GaussianCost(ruptures.base.BaseCost):
         return count * (np.log((self.squares[end] - self.squares[start]) / count - mean * mean) + 1.0)
 
 
-def change_points(case, series, table, fast):
+def change_points(case, series, table, turns):
     def divide():
         kind = {"model": "l2"} if case["cost"] == "l2" else {"custom_cost": GaussianCost()}
         pelt = ruptures.Pelt(min_size=case["shortest"], jump=1, **kind).fit(series)
         return pelt, pelt.predict(pen=case["penalty"])
 
-    (pelt, changes), seconds = timed(divide, 1 if case["rows"] > 2000 else ROUNDS)
+    pelt, changes = divide()
     total = pelt.cost.sum_of_costs(changes)
     theirs, ours = changes[:-1], case["changes"]
     same = len(set(theirs) & set(ours))
@@ -147,7 +162,8 @@ def change_points(case, series, table, fast):
     table.append(
         f"| {case['series']} | {case['cost']} | {len(ours)} | {len(theirs)} | {same} | {bill[0]:.6f} | {bill[1]:.6f} |"
     )
-    speeds(f"{case['series']}: PELT, {case['cost']}, ruptures", case["rows"], case["seconds"]["divide"], seconds, fast)
+    what, asked = f"{case['series']}: PELT, {case['cost']}, ruptures", f"{case['series']} {case['cost']}"
+    turns.tell(what, case["rows"], asked, divide, rounds=3 if case["rows"] <= 2000 else 1)
     wrong = []
     if ours != theirs and not bill[0] < bill[1] - 1e-9 * abs(bill[1]):
         wrong.append("other change points, and no better ones")
@@ -160,10 +176,11 @@ def main():
     folder = Path(sys.argv[1])
     cases = json.loads((folder / "trueup.json").read_text())["cases"]
     models, changes, fast, wrong = [], [], [], []
+    turns = Turns(sys.argv[2], fast)
     for case in cases:
         series = read(folder / f"{case['series']}.csv")
         told = hidden_markov if case["kind"] == "hidden_markov" else change_points
-        found = told(case, series, models if told is hidden_markov else changes, fast)
+        found = told(case, series, models if told is hidden_markov else changes, turns)
         wrong += [f"{case['series']}: {what}" for what in found]
     versions = ", ".join(f"{name} {version(name)}" for name in ("hmmlearn", "ruptures", "numpy"))
     head = "|---|" + "---:|"
@@ -179,7 +196,8 @@ def main():
     print("| series | cost | changes: trueup | changes: ruptures | same | total: trueup | total: ruptures |")
     print("|---|---|" + "---:|" * 5)
     print("\n".join(changes))
-    print("\n## Time\n\nLeast and most of several rounds over two seconds at least; the ratio is of the least, which a busy machine disturbs less.\n")
+    print("\n## Time\n\nOf each thing both do it by turns, a twentieth of a second each, and the least of each turn counts. Told are the median")
+    print(f"of {ROUNDS} turns, and the median ratio of turns, with the tenth and the last tenth of them.\n")
     print("| what | rows | trueup | other | times as fast |")
     print(head + "---:|" * 3)
     print("\n".join(fast))

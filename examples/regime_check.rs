@@ -1,11 +1,15 @@
 //! Regimes of made series, for checks/regime_check.py to hold to other libraries: writes the series as CSV into a folder, and what
-//! was found, with the time it took, to stdout as JSON.
+//! was found to stdout as JSON. With `--timed` it says nothing until it is asked: for each line on stdin, as `levels_100000 viterbi`, it
+//! does that for some milliseconds, and tells the least seconds it took, so that whoever asks may time something else by turns.
 //!
 //! ```text
 //! cargo run --release --example regime_check -- out/regimes >out/regimes/trueup.json
+//! echo levels_100000 viterbi | cargo run --release --example regime_check -- --timed
 //! ```
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
@@ -15,32 +19,96 @@ use trueup::sim2real::regime::{
     Cost, Division, Emission, Family, HiddenMarkov, Observations, Penalty, RegimeError, Settings, Spread, fit, refit,
 };
 
-/// Times each thing is timed at least, and for how long [s]: the least and the most are told. A machine with other things to do is slower for
-/// some seconds, and so is whatever is timed in them.
-const ROUNDS: usize = 15;
-const SECONDS: f64 = 2.0;
+/// For how long [s] a thing is done when it is asked for; the least of that time is told.
+const SECONDS: f64 = 0.02;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let Some(folder) = std::env::args().nth(1) else {
-        return Err("usage: regime_check FOLDER".into());
+        return Err("usage: regime_check FOLDER, or regime_check --timed".into());
     };
-    let folder = Path::new(&folder);
+    if folder == "--timed" { serve() } else { found(Path::new(&folder)) }
+}
+
+/// Writes the series, and what is found of them.
+fn found(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     std::fs::create_dir_all(folder)?;
     let mut cases = vec![];
     for (name, model, family, rows) in models()? {
-        let drawn = model.simulate(rows, Seed(1));
-        write_series(&folder.join(format!("{name}.csv")), &drawn.values, model.width())?;
-        cases.push(hidden_markov(name, &model, family, &drawn.values)?);
+        let values = model.simulate(rows, Seed(1)).values;
+        write_series(&folder.join(format!("{name}.csv")), &values, model.width())?;
+        cases.push(hidden_markov(name, &model, family, &values)?);
     }
-    for (name, rows, seed) in [("steps_2000", 2_000, 2), ("steps_5000", 5_000, 3)] {
+    for (name, rows, seed) in DIVIDED {
         let series = steps(rows, seed)?;
         write_series(&folder.join(format!("{name}.csv")), &series, 1)?;
-        for (cost, told, shortest) in [(Cost::Mean, "l2", 2), (Cost::MeanAndVariance, "normal", 5)] {
-            cases.push(division(name, &series, cost, told, shortest)?);
+        for (told, cost) in COSTS {
+            cases.push(division(name, &series, told, cost)?);
         }
     }
-    println!("{}", serde_json::to_string_pretty(&json!({ "rounds": ROUNDS, "seconds": SECONDS, "cases": cases }))?);
+    println!("{}", serde_json::to_string_pretty(&json!({ "cases": cases }))?);
     Ok(())
+}
+
+/// What is divided: name, rows, seed.
+const DIVIDED: [(&str, usize, u64); 2] = [("steps_2000", 2_000, 2), ("steps_5000", 5_000, 3)];
+
+const COSTS: [(&str, Cost); 2] = [("l2", Cost::Mean), ("normal", Cost::MeanAndVariance)];
+
+/// Does what lines on stdin ask for, and tells the least seconds of each.
+fn serve() -> Result<(), Box<dyn std::error::Error>> {
+    let timed = timed()?;
+    for line in std::io::stdin().lines() {
+        let line = line?;
+        let run = timed.get(line.trim()).ok_or_else(|| format!("nothing is called `{line}`"))?;
+        let (begun, mut least) = (Instant::now(), f64::INFINITY);
+        while begun.elapsed().as_secs_f64() < SECONDS {
+            let started = Instant::now();
+            let times = run()?;
+            least = least.min(started.elapsed().as_secs_f64() / times as f64);
+        }
+        println!("{least:e}");
+        std::io::stdout().flush()?;
+    }
+    Ok(())
+}
+
+/// Does a thing and tells how many times.
+type Timed = Box<dyn Fn() -> Result<usize, RegimeError>>;
+
+fn timed() -> Result<BTreeMap<String, Timed>, RegimeError> {
+    let mut timed = BTreeMap::<String, Timed>::new();
+    for (name, model, family, rows) in models()? {
+        let values = model.simulate(rows, Seed(1)).values;
+        // They live as long as the process.
+        let (model, values): (&HiddenMarkov, &[f64]) = (Box::leak(Box::new(model)), Vec::leak(values));
+        let series = Observations::rows(values, model.width())?;
+        let few = Settings { iterations: 20, tolerance: 0.0, ..settings(model, family) };
+        let mut put = |what: &str, run: Timed| timed.insert(format!("{name} {what}"), run);
+        put("log_likelihood", Box::new(move || model.log_likelihood(series).map(|_| 1)));
+        put("viterbi", Box::new(move || model.viterbi(series).map(|_| 1)));
+        put("posterior", Box::new(move || model.smooth(series).map(|_| 1)));
+        put("iteration", Box::new(move || refit(model, &[series], &few).map(|fit| fit.iterations)));
+    }
+    for (name, rows, seed) in DIVIDED {
+        let series: &[f64] = Vec::leak(steps(rows, seed)?);
+        for (told, cost) in COSTS {
+            let division = division_of(cost, series);
+            timed.insert(format!("{name} {told}"), Box::new(move || division.divide(series).map(|_| 1)));
+        }
+    }
+    Ok(timed)
+}
+
+fn settings(model: &HiddenMarkov, family: Family) -> Settings {
+    Settings { family, tolerance: 1e-9, iterations: 1_000, ..Settings::new(model.states()) }
+}
+
+fn division_of(cost: Cost, series: &[f64]) -> Division {
+    if cost == Cost::Mean {
+        Division { cost, penalty: Penalty::Bic, shortest: 2 }
+    } else {
+        Division { cost, penalty: Penalty::Given(4.0 * (series.len() as f64).ln()), shortest: 5 }
+    }
 }
 
 type Case = (&'static str, HiddenMarkov, Family, usize);
@@ -97,28 +165,11 @@ fn models() -> Result<Vec<Case>, RegimeError> {
     ])
 }
 
-/// The true parameters on the series: log-likelihood and path; iterations from them; and a fit of its own starts.
+/// The true parameters on the series: log-likelihood, path and posterior; and a fit of its own starts.
 fn hidden_markov(name: &str, model: &HiddenMarkov, family: Family, values: &[f64]) -> Result<Value, RegimeError> {
     let series = Observations::rows(values, model.width())?;
     let (path, path_log) = model.viterbi(series)?;
-    let settings = Settings { family, tolerance: 1e-9, iterations: 1_000, ..Settings::new(model.states()) };
-    let fitted = fit(&[series], &settings)?;
-    let few = Settings { iterations: 20, tolerance: 0.0, ..settings };
-    let iteration = least_and_most(|| {
-        let started = Instant::now();
-        let iterations = refit(model, &[series], &few)?.iterations;
-        Ok(started.elapsed().as_secs_f64() / iterations as f64)
-    })?;
-    let timed = |run: &dyn Fn() -> Result<(), RegimeError>| {
-        least_and_most(|| {
-            let started = Instant::now();
-            run()?;
-            Ok(started.elapsed().as_secs_f64())
-        })
-    };
-    let decode = timed(&|| model.viterbi(series).map(drop))?;
-    let smooth = timed(&|| model.smooth(series).map(drop))?;
-    let score = timed(&|| model.log_likelihood(series).map(drop))?;
+    let fitted = fit(&[series], &settings(model, family))?;
     Ok(json!({
         "kind": "hidden_markov", "series": name, "rows": series.len(), "width": model.width(),
         "full": family == Family::GaussianFull, "model": model,
@@ -128,22 +179,15 @@ fn hidden_markov(name: &str, model: &HiddenMarkov, family: Family, values: &[f64
             "model": fitted.model, "log_likelihood": fitted.log_likelihood, "converged": fitted.converged,
             "iterations": fitted.iterations, "path": fitted.model.viterbi(series)?.0,
         },
-        "seconds": { "iteration": iteration, "viterbi": decode, "posterior": smooth, "log_likelihood": score },
     }))
 }
 
-fn division(name: &str, series: &[f64], cost: Cost, told: &str, shortest: usize) -> Result<Value, RegimeError> {
-    let penalty = if cost == Cost::Mean { Penalty::Bic } else { Penalty::Given(4.0 * (series.len() as f64).ln()) };
-    let division = Division { cost, penalty, shortest };
+fn division(name: &str, series: &[f64], told: &str, cost: Cost) -> Result<Value, RegimeError> {
+    let division = division_of(cost, series);
     let found = division.divide(series)?;
-    let seconds = least_and_most(|| {
-        let started = Instant::now();
-        division.divide(series)?;
-        Ok(started.elapsed().as_secs_f64())
-    })?;
     Ok(json!({
         "kind": "change_points", "series": name, "rows": series.len(), "cost": told, "penalty": found.penalty,
-        "shortest": shortest, "changes": found.changes, "total": found.cost, "seconds": { "divide": seconds },
+        "shortest": division.shortest, "changes": found.changes, "total": found.cost,
     }))
 }
 
@@ -160,16 +204,6 @@ fn steps(rows: usize, seed: u64) -> Result<Vec<f64>, RegimeError> {
     let row = |from: usize| (0..6).map(|to| if to == from { stay } else { (1.0 - stay) / 5.0 }).collect();
     let model = HiddenMarkov::new(vec![1.0 / 6.0; 6], (0..6).map(row).collect(), states)?;
     Ok(model.simulate(rows, Seed(seed)).values)
-}
-
-fn least_and_most(mut run: impl FnMut() -> Result<f64, RegimeError>) -> Result<[f64; 2], RegimeError> {
-    let (mut bounds, mut rounds, started) = ([f64::INFINITY, 0.0], 0, Instant::now());
-    while rounds < ROUNDS || started.elapsed().as_secs_f64() < SECONDS {
-        let seconds = run()?;
-        bounds = [bounds[0].min(seconds), bounds[1].max(seconds)];
-        rounds += 1;
-    }
-    Ok(bounds)
 }
 
 fn write_series(path: &Path, values: &[f64], width: usize) -> std::io::Result<()> {
