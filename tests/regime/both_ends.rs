@@ -133,10 +133,57 @@ fn check_densities(model: &HiddenMarkov, rows: &[f64]) {
 fn a_path_that_alternates_is_found_where_halves_meet() {
     let transition = vec![vec![0.1, 0.9], vec![0.9, 0.1]];
     let model = HiddenMarkov::new(vec![0.5, 0.5], transition, vec![state(0.0, 1.0), state(5.0, 1.0)]).unwrap();
-    for count in [2, 3, 4, 5, 127, 128, 129, 130, 1_000, 1_001] {
+    for count in [2, 3, 4, 5, 127, 128, 129, 130, 1_000, 1_001, 2_040, 2_041, 2_048, 2_055, 5_003] {
         let path: Vec<usize> = (0..count).map(|row| row % 2).collect();
         let rows: Vec<f64> = path.iter().map(|state| 5.0 * *state as f64 + 0.2).collect();
         assert!(model.viterbi(Observations::of(&rows).unwrap()).unwrap().0 == path, "{count} rows");
+    }
+}
+
+/// Two states that are hardly ever left, of which one row at an end tells which it is, and no other does: within the series nothing of it is
+/// known, and yet it holds for all of it.
+#[test]
+fn what_the_ends_know_holds_within() {
+    let stay = 1.0 - 1e-9;
+    let transition = vec![vec![stay, 1e-9], vec![1e-9, stay]];
+    let model = HiddenMarkov::new(vec![0.5, 0.5], transition, vec![state(0.0, 1.0), state(1.0, 1.0)]).unwrap();
+    for count in [2_041, 4_096, 5_000] {
+        for telling in [0, count - 1] {
+            for (x, known) in [(3.0, 1), (-2.0, 0)] {
+                let mut rows = vec![0.5; count];
+                rows[telling] = x;
+                let (path, log) = model.viterbi(Observations::of(&rows).unwrap()).unwrap();
+                assert!(path.iter().all(|state| *state == known), "{count} rows, row {telling} {x}");
+                let right = Textbook::of(&model, &rows).best;
+                assert!((log - right).abs() < 1e-10 * right.abs(), "{log} and {right}");
+            }
+        }
+    }
+}
+
+/// Sticky states that hardly differ, whose evidence is gathered over thousands of rows, and states that change at any row.
+#[test]
+fn paths_of_long_series_are_those_of_textbooks() {
+    for (stay, level) in [(0.5, 0.3), (0.9, 1.0), (0.99, 0.2), (0.9999, 0.05), (0.999_999, 0.05)] {
+        for states in 2..=5_usize {
+            let leave = (1.0 - stay) / (states - 1) as f64;
+            let row = |from: usize| (0..states).map(|to| if to == from { stay } else { leave }).collect();
+            let levels = (0..states).map(|k| state(level * k as f64, 1.0 + 0.1 * k as f64)).collect();
+            let model =
+                HiddenMarkov::new(vec![1.0 / states as f64; states], (0..states).map(row).collect(), levels).unwrap();
+            for count in [2_043, 6_007] {
+                let mut rows = model.simulate(count, Seed(count as u64 + states as u64)).values;
+                rows.iter_mut().skip(5).step_by(101).for_each(|x| *x = f64::NAN);
+                let right = Textbook::of(&model, &rows).best;
+                let (path, log) = model.viterbi(Observations::of(&rows).unwrap()).unwrap();
+                let steps: f64 = path.windows(2).map(|pair| model.transitions(pair[0])[pair[1]].ln()).sum();
+                let densities: f64 = path.iter().zip(&rows).map(|(k, x)| log_density(&model.emissions()[*k], *x)).sum();
+                let along = model.initial()[path[0]].ln() + steps + densities;
+                let case = format!("{states} states that stay by {stay}, {level} apart, {count} rows");
+                let close = |found: f64| (found - right).abs() < 1e-10 * right.abs();
+                assert!(close(log) && close(along), "{case}: {log}, {along} along it, and {right}");
+            }
+        }
     }
 }
 

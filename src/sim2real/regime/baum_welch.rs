@@ -338,7 +338,8 @@ impl Expected {
             expected.transition.iter_mut().zip(&trellis.crossing).for_each(|(sum, count)| *sum += count);
             let densities = model.densities();
             let block = [states, model.width()].map(|count| vec![[0.0; LANES]; count]);
-            let mut counting = Counting { expected: &mut expected, transition: &mut transition, series: *part, densities, block };
+            let mut counting =
+                Counting { expected: &mut expected, transition: &mut transition, series: *part, densities, block };
             trellis.backward(model, &mut counting);
         }
         for (k, sum) in expected.transition.iter_mut().enumerate() {

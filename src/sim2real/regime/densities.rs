@@ -86,14 +86,7 @@ impl Densities {
         Ok(densities)
     }
 
-    /// Squared Mahalanobis distance of a row from the mean of a state.
-    #[inline(always)]
-    pub fn distance(&self, state: usize, row: &[f64]) -> f64 {
-        let [distance] = self.distances(state, row.as_chunks::<1>().0);
-        distance
-    }
-
-    /// The same of rows side by side, `[column][row]`.
+    /// Squared Mahalanobis distances of rows side by side, `[column][row]`, from the mean of a state.
     #[inline(always)]
     pub fn distances<const N: usize>(&self, state: usize, columns: &[[f64; N]]) -> [f64; N] {
         let means = &self.means[state * self.width..][..self.width];

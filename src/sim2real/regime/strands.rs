@@ -52,12 +52,6 @@ impl<'a> Strands<'a> {
         self.lanes() * self.length - self.series.len()
     }
 
-    /// Rows of some of a strand's own steps, in the order of the series.
-    pub fn own(&self, lane: usize, steps: Range<usize>) -> Range<usize> {
-        let before = lane / 2 * self.length;
-        self.rows(lane, before + steps.start..before + steps.end)
-    }
-
     /// Rows, in the order of the series, by the number of rows between them and the end that a lane goes from.
     fn rows(&self, lane: usize, between: Range<usize>) -> Range<usize> {
         if lane.is_multiple_of(2) {

@@ -116,7 +116,9 @@ impl<'a> Ways<'a> {
     /// Where a strand ends and the next begins: their lanes.
     fn joints(&self) -> impl Iterator<Item = [usize; 2]> {
         let from_each = self.strands.from_each;
-        [false, true].into_iter().flat_map(move |back| (1..from_each).map(move |k| [k - 1, k].map(|k| Strands::lane(k, back))))
+        [false, true]
+            .into_iter()
+            .flat_map(move |back| (1..from_each).map(move |k| [k - 1, k].map(|k| Strands::lane(k, back))))
     }
 
     /// Whether strands begin with what is known where those before them end, but for what all states share.
@@ -132,7 +134,8 @@ impl<'a> Ways<'a> {
 
     /// Of the likeliest state where a strand ends, the score, and how much less that was where the next began.
     fn apart(&self, [before, after]: [usize; 2]) -> (f64, f64) {
-        let scores = self.scores.next.iter().zip(&self.begun).map(|(next, begun)| (next[before], next[before] - begun[after]));
+        let scores =
+            self.scores.next.iter().zip(&self.begun).map(|(next, begun)| (next[before], next[before] - begun[after]));
         scores.fold((f64::NEG_INFINITY, 0.0), |best, score| if score.0 > best.0 { score } else { best })
     }
 
