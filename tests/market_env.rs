@@ -10,11 +10,12 @@ use account_scene::{of, with};
 use env_scene::{Numbers, ROWS, at_random, bits, env, market, played, portfolio, run_for};
 use market_scene::{bars, instrument, venue};
 use trueup::market::env::{
-    DataKind, ENVIRONMENTS, Ended, Execute, MakeMarket, MarketEnv, MarketSetup, Pace, Portfolio, Task, Ways,
+    DataKind, DrawnExecution, ENVIRONMENTS, Ended, Execute, MakeMarket, MarketEnv, MarketSetup, Pace, Portfolio, Task, Ways,
 };
 use trueup::market::{Backtest, History, Orders, Quotes, Record, Settings, Strategy, Terms, View};
 use trueup::rl::{Actions, Buffers, Env, Episode, Options, Step, Threads, VecEnv, Which, check_env};
-use trueup::sim2real::Timestamp;
+use trueup::sim2real::randomize::{Distribution, Level, Randomized, Randomizer, Redraw, Target};
+use trueup::sim2real::{Parameter, Timestamp};
 
 /// Plays an episode at random, and the same actions as a strategy in the backtest that the episode is: the records must be the
 /// same, and the policy must have seen the same.
@@ -64,6 +65,55 @@ fn an_episode_is_the_backtest_of_what_is_done_in_it_to_the_last_bit() {
         assert!((0..3).all(|k| record.blotter.fills.iter().any(|fill| fill.instrument == k)));
     }
     assert!(fills > 100, "{fills} fills of quotes");
+}
+
+/// A rough market of which everything that can be drawn within an episode is: by the clock and with the regimes of its data.
+fn drawn_within(kind: DataKind) -> MarketSetup {
+    let drawn = |id: &str, name: &'static str, (low, high): (f64, f64), at| Randomized {
+        target: Target::of(id, name),
+        parameter: Parameter::new(name, "", 0.5).within(0.0, 1e6),
+        distribution: Distribution::Uniform { low, high },
+        relative: false,
+        at,
+    };
+    let randomized = vec![
+        drawn("transient_impact", "bps_at_full_participation", (1.0, 90.0), Redraw::EverySeconds(60.0)),
+        drawn("transient_impact", "recovery", (1.0, 900.0), Redraw::Regime(1)),
+        drawn("adverse_selection", "bps", (0.0, 3.0), Redraw::Regime(0)),
+        drawn("commission", "bps", (0.0, 2.0), Redraw::EverySeconds(45.0)),
+        drawn("latency", "order", (0.0, 2.0), Redraw::EverySeconds(60.0)),
+        drawn("latency", "feed", (0.0, 0.5), Redraw::Regime(1)),
+        drawn("latency", "response", (0.0, 0.5), Redraw::Reset),
+    ];
+    let execution = DrawnExecution { randomizer: Randomizer::new(randomized, vec![]).unwrap(), level: Level::FULL };
+    MarketSetup::new(market(kind, 1, ROWS, true)).with_execution(execution)
+}
+
+#[test]
+fn what_is_drawn_within_an_episode_is_drawn_in_its_backtest() {
+    for kind in [DataKind::Bars, DataKind::Quotes, DataKind::Book] {
+        for (seed, length) in [(1, None), (2, Some(200))] {
+            let setup = || MarketSetup { length, ..drawn_within(kind) };
+            let record = same_as_in_a_backtest(env(setup(), portfolio(1)), seed, 800, &format!("{kind:?} drawn within"));
+            assert!(!record.blotter.fills.is_empty());
+            // A copy in the midst goes on with the same bits, and draws the same.
+            let mut one = env(setup(), portfolio(1));
+            played(&mut one, Episode { seed, number: 2 }, 60, at_random(seed));
+            let mut other = one.clone();
+            let go_on = |env: &mut MarketEnv<Portfolio>| {
+                let (mut observation, mut all) = (vec![0.0; env.about().observation.size()], Vec::new());
+                for k in 0..60_u8 {
+                    let step = env.step(Actions::Continuous(&[f32::from(k % 5) / 2.0 - 1.0]), &mut observation).unwrap();
+                    let drawn: Vec<u64> = (0..7).map(|k| env.privileged(k).to_bits()).collect();
+                    all.push((bits(&observation), step.reward.to_bits(), drawn));
+                }
+                all
+            };
+            let told = go_on(&mut one);
+            assert!(told == go_on(&mut other));
+            assert!(told[0].2 != told[59].2, "{kind:?}: nothing was drawn");
+        }
+    }
 }
 
 /// Decides by itself, and shares nothing with environments.

@@ -126,6 +126,98 @@ fn what_is_drawn_for_an_episode_is_what_it_runs_on() {
     assert!(refused.to_string().starts_with("`half_spread.bps` cannot be drawn: the venue has commission, latency\nhint: "));
 }
 
+/// Commission [bps] that is drawn `at`, on quotes whose data have two regimes.
+fn commission_drawn(at: Redraw) -> (MarketSetup, DrawnExecution) {
+    let one = Randomized {
+        target: Target::of("commission", "bps"),
+        parameter: Parameter::new("bps", "bps", 0.5).within(0.0, 1e3),
+        distribution: Distribution::Uniform { low: 1.0, high: 9.0 },
+        relative: false,
+        at,
+    };
+    let execution = DrawnExecution { randomizer: Randomizer::new(vec![one], vec![]).unwrap(), level: Level::FULL };
+    let data = generated(DataKind::Quotes, 1, ROWS);
+    let settings = Settings::with_cash(Cash::nearest(1e6).unwrap());
+    let (all, histories) = (data.instruments(), data.histories().unwrap());
+    let backtest = Backtest::new(all, histories, venue(&[("commission", "bps", 0.5)]), settings).unwrap();
+    (MarketSetup::new(backtest), execution)
+}
+
+/// Fees of fills [bps], with the time of each [s].
+fn fees<T: trueup::market::env::Task>(env: &MarketEnv<T>) -> Vec<(f64, f64)> {
+    let record = env.record().unwrap().unwrap();
+    let bps = |fill: &trueup::market::Fill| 1e4 * fill.fee.to_f64() / (fill.price.to_f64() * fill.quantity.to_f64());
+    record.blotter.fills.iter().map(|fill| (fill.filled_at.0 as f64 / 1e9, bps(fill))).collect()
+}
+
+#[test]
+fn what_is_drawn_by_the_clock_is_another_in_each_interval_and_the_same_within() {
+    let (setup, execution) = commission_drawn(Redraw::EverySeconds(100.0));
+    let first = setup.backtest.histories()[0].quotes().times()[0].0 as f64 / 1e9;
+    let mut one = env(setup.clone().with_execution(execution.clone()), portfolio(1));
+    let mut told = std::collections::BTreeMap::<u64, f64>::new();
+    let time = one.about().channel("time").unwrap();
+    played(&mut one, Episode { seed: 5, number: 1 }, usize::MAX, |env, observation| {
+        let interval = ((env.info(time) - first) / 100.0) as u64;
+        let now = env.privileged(0);
+        assert!(*told.entry(interval).or_insert(now) == now && (1.0..9.0).contains(&now));
+        at_random(observation.len() as u64 + env.info(time) as u64)(env, observation)
+    });
+    let values: Vec<f64> = told.values().copied().collect();
+    assert!(values.len() > 5 && values.windows(2).all(|w| w[0] != w[1]), "{values:?}");
+    let paid = fees(&one);
+    assert!(paid.len() > 50, "{}", paid.len());
+    for (at, bps) in paid {
+        // What is filled at the very end of an interval belongs to it.
+        let interval = ((at - first) / 100.0) as u64;
+        assert!((bps - told[&interval]).abs() < 1e-6, "{bps} at {at}, in an interval of {}", told[&interval]);
+    }
+    // Another episode draws others, the same one the same.
+    let mut again = env(setup.with_execution(execution), portfolio(1));
+    let mut ends = |number| {
+        played(&mut again, Episode { seed: 5, number }, usize::MAX, at_random(1));
+        again.privileged(0)
+    };
+    assert_eq!(ends(1), *values.last().unwrap());
+    assert!(ends(2) != *values.last().unwrap());
+}
+
+#[test]
+fn what_is_drawn_with_a_regime_is_nominal_outside_it() {
+    let (setup, execution) = commission_drawn(Redraw::Regime(1));
+    let mut one = env(setup.with_execution(execution), portfolio(1));
+    let component = |name: &str| one.about().observation.component(name).unwrap();
+    let (calm, turbulent) = (component("regime_0"), component("regime_1"));
+    let (mut values, mut outside) = (Vec::new(), 0);
+    played(&mut one, Episode { seed: 5, number: 1 }, usize::MAX, |env, observation| {
+        let now = env.privileged(0);
+        let within = observation[turbulent] > observation[calm];
+        assert_eq!(now != 0.5, within, "{now}, probability {}", observation[turbulent]);
+        assert!(!within || (1.0..9.0).contains(&now));
+        outside += usize::from(!within);
+        if within && values.last() != Some(&now) {
+            values.push(now);
+        }
+        at_random(observation.len() as u64 + values.len() as u64)(env, observation)
+    });
+    assert!(values.len() > 3 && outside > 50, "{values:?}, {outside} steps outside");
+    let paid = fees(&one);
+    assert!(paid.iter().any(|(_, bps)| (bps - 0.5).abs() < 1e-6));
+    assert!(paid.iter().any(|(_, bps)| *bps > 1.0 - 1e-6));
+}
+
+#[test]
+fn what_cannot_be_drawn_within_an_episode_is_refused() {
+    let refused = |at| {
+        let (setup, execution) = commission_drawn(at);
+        MarketEnv::new("trueup/Test-v0", "", setup.with_execution(execution), portfolio(1), 1).unwrap_err().to_string()
+    };
+    let told = refused(Redraw::EverySteps(3));
+    assert!(told.starts_with("`commission.bps` is drawn anew every so many steps\nhint: "), "{told}");
+    let told = refused(Redraw::Regime(2));
+    assert!(told.starts_with("`commission.bps` is drawn in regime 2, and there are 2, counted from 0\nhint: "), "{told}");
+}
+
 #[test]
 fn ruin_ends_an_episode_and_a_halt_and_refusals_are_told() {
     // It falls to a tenth within two bars.

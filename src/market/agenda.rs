@@ -54,6 +54,8 @@ pub(super) enum Due {
     Revoke(OrderId),
     /// A dividend or a split, by its number.
     Action(usize),
+    /// Parameters are drawn anew: the number of their group.
+    Redraw(usize),
 }
 
 /// What is due, in the order of time, phase, and then in the order in which it was put down.

@@ -7,6 +7,7 @@ use crate::sim2real::{Assembly, Seed, Timestamp};
 use super::blotter::Blotter;
 use super::halt::check_halts;
 use super::line::Line;
+use super::redraws::Redraws;
 use super::sources::RowKind;
 use super::{
     Account, AccountRecord, Calendar, Cash, DataNotes, Execution, Feed, Halt, HaltSeen, History, Increments, Instrument,
@@ -22,6 +23,8 @@ pub struct Backtest {
     pub(super) histories: Vec<History>,
     pub(super) venue: Assembly<Execution>,
     pub(super) settings: Settings,
+    /// What is drawn anew within a run.
+    pub(super) redraws: Option<Arc<Redraws>>,
 }
 
 /// What else a backtest depends on.
@@ -333,7 +336,7 @@ impl Backtest {
             account.check(&instruments)?;
             account.check_actions(&instruments, &histories)?;
         }
-        Ok(Self { instruments, increments, histories, venue, settings })
+        Ok(Self { instruments, increments, histories, venue, settings, redraws: None })
     }
 
     /// The instruments.

@@ -198,6 +198,10 @@ impl Session {
                 Some(instrument)
             }
             Due::Action(number) => return self.take_action(number, at, None),
+            Due::Redraw(group) => {
+                self.redraw(group);
+                None
+            }
             Due::Notice(_) | Due::Wake => None,
         };
         match instrument {

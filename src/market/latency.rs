@@ -247,6 +247,11 @@ impl Clocks {
         }
     }
 
+    /// Messages that leave from now on take so long; those on their way arrive as they would have.
+    pub fn retune(&mut self, latencies: Latencies, stale: f64) {
+        (self.latencies, self.stale) = (latencies, stale);
+    }
+
     /// Whether anybody wants to know how strained the market is.
     pub fn watches(&self) -> bool {
         self.latencies.strain != Strain::default()

@@ -79,6 +79,7 @@ mod rates;
 mod reason;
 mod recent;
 pub mod reconcile;
+mod redraws;
 pub mod response;
 mod reversal;
 mod row_check;

@@ -19,6 +19,7 @@ use super::line::Line;
 use super::mail::Mail;
 use super::mechanism::StaleQuotes;
 use super::mechanism::{Need, needs};
+use super::redraws::Redrawn;
 use super::sources::RowKind;
 use super::transit::Transit;
 use super::venue::{Auctions, Detail, Outcome, Resting, Rules, Setup, Venue};
@@ -66,6 +67,8 @@ pub struct Session {
     rows: usize,
     /// Terms, rates and corporate actions, where the account has any.
     pub(super) keeping: Option<Box<Keeping>>,
+    /// What is drawn anew within the run.
+    pub(super) redrawn: Option<Box<Redrawn>>,
 }
 
 impl fmt::Debug for Session {
@@ -139,14 +142,18 @@ impl Session {
         }
         let mut agenda = Agenda::default();
         let (ledger, keeping) = Keeping::start(&setup.settings, count, origin, &mut agenda);
+        let redrawn = setup.redraws.as_ref().map(|plan| Redrawn::new(plan, &setup.venue, &latencies, origin));
+        redrawn.iter().flat_map(Redrawn::first).for_each(|(at, phase, due)| agenda.put(at, phase, due));
+        let late = redrawn.as_ref().is_some_and(|redrawn| redrawn.delays_data(&setup.venue));
         let mut session = Self {
+            redrawn: redrawn.map(Box::new),
             setup,
             equity: EquityCurve::new(equity_every, room),
             feed,
             trades_mark,
             transit: Transit::new(count),
             agenda,
-            direct: latencies.feed.is_none() && stale == 0.0,
+            direct: latencies.feed.is_none() && stale == 0.0 && !late,
             can_be_quiet: false,
             clocks: Clocks::new(latencies, stale, seed),
             timetable,
@@ -219,6 +226,7 @@ impl Session {
             held: self.held,
             rows: self.rows,
             keeping: self.keeping.clone(),
+            redrawn: self.redrawn.clone(),
         })
     }
 

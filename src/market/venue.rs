@@ -23,9 +23,11 @@ mod shown;
 mod standing;
 mod taken;
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
-use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin};
+use crate::sim2real::{Assembly, Seed, Simulator, Site, Thetas, Timestamp, Twin, law_parameters};
 
 use super::mechanism::charge_kind;
 use super::{AnotherFill, Book, ChargeKind, DepthBook, Execution, Increments, Quantity, Side, WhileHalted};
@@ -115,6 +117,8 @@ pub(super) struct Venue {
     pub conceding: Vec<&'static str>,
     /// What each mechanism that may charge, on fills or on what is held, charges for.
     pub charges: Vec<ChargeKind>,
+    /// Which of the parameters each law has.
+    of_laws: [Vec<Range<usize>>; 3],
 }
 
 /// What a venue is made of beside its mechanisms.
@@ -171,7 +175,14 @@ impl Venue {
             floor
         };
         let floors = setup.symbols.iter().enumerate().map(floor).collect();
-        Self { floors, conceding, charges }
+        Self { floors, conceding, charges, of_laws: law_parameters(assembly) }
+    }
+}
+
+impl Venue {
+    /// Laws have these values of all parameters from now on; what they remember stays.
+    pub fn retune(&mut self, values: &[f64]) {
+        self.floors.iter_mut().for_each(|floor| floor.run.retune_laws(&self.of_laws, 0, values));
     }
 }
 

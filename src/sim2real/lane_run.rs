@@ -52,6 +52,38 @@ impl<P: Plant> fmt::Debug for LaneRun<P> {
 )]
 pub struct LoopIsClosed;
 
+/// Commands, the plant, observations.
+fn site_number(site: Site) -> usize {
+    match site {
+        Site::Command => 0,
+        Site::Plant => 1,
+        Site::Observation => 2,
+    }
+}
+
+/// Of each law, which of an assembly's parameters it has, in the order in which the laws of a site act.
+#[must_use]
+pub(crate) fn law_parameters<P: Plant>(assembly: &Assembly<P>) -> [Vec<Range<usize>>; 3] {
+    let mut of_laws = [const { Vec::new() }; 3];
+    let mut at = assembly.own().len();
+    for (mechanism, form, parameters) in assembly.mechanisms() {
+        of_laws[site_number(mechanism.site(form))].push(at..at + parameters.len());
+        at += parameters.len();
+    }
+    of_laws
+}
+
+impl<P: Plant> Run<P> {
+    /// Gives the laws of lane `lane` these values of all of the assembly's parameters from now on, of which `of_laws` says whose they are;
+    /// what they remember stays.
+    pub(crate) fn retune_laws(&mut self, of_laws: &[Vec<Range<usize>>; 3], lane: usize, values: &[f64]) {
+        let change = LaneChange::Retune { lane, values };
+        change_laws(&mut self.command_laws, &of_laws[0], &change);
+        change_laws(&mut self.plant_laws, &of_laws[1], &change);
+        change_laws(&mut self.observation_laws, &of_laws[2], &change);
+    }
+}
+
 /// Changes all laws of a run, each with the parameters it has in these ranges.
 fn change_laws<P: Plant>(laws: &mut [Box<dyn Law<P>>], ranges: &[Range<usize>], change: &LaneChange<'_>) {
     for (law, range) in laws.iter_mut().zip(ranges) {
@@ -86,18 +118,13 @@ where
         let nominal: Vec<f64> = assembly.parameters().iter().map(|p| p.nominal).collect();
         let thetas = Thetas::from_lanes(&vec![nominal; lanes]);
         let run = assembly.run(&thetas, &Thetas::from_lanes(&vec![initial; lanes]), Seed(0));
-        let mut of_laws = [Vec::new(), Vec::new(), Vec::new()];
-        let (mut places, mut forms, mut at) = (Vec::new(), Vec::new(), plant);
-        for (mechanism, form, parameters) in assembly.mechanisms() {
-            let site = match mechanism.site(form) {
-                Site::Command => 0,
-                Site::Plant => 1,
-                Site::Observation => 2,
-            };
-            places.push((mechanism.about().name, site, of_laws[site].len()));
+        let of_laws = law_parameters(assembly);
+        let (mut places, mut forms, mut laws) = (Vec::new(), Vec::new(), [0; 3]);
+        for (mechanism, form, _) in assembly.mechanisms() {
+            let site = site_number(mechanism.site(form));
+            places.push((mechanism.about().name, site, laws[site]));
             forms.push(form);
-            of_laws[site].push(at..at + parameters.len());
-            at += parameters.len();
+            laws[site] += 1;
         }
         Ok(Self { run, plant: 0..plant, of_laws, places, forms })
     }

@@ -34,6 +34,7 @@ pub use check::{Violation, check_mechanism, check_plant};
 pub use check_lanes::check_lanes;
 pub use controller::{Controller, DerivativeOf, Feedback, Pid};
 pub use lane::{LaneChange, LaneDraws, LaneImage};
+pub(crate) use lane_run::law_parameters;
 pub use lane_run::{LaneDynamics, LaneRun, LoopIsClosed};
 pub use mechanism::{About, Form, Law, Mechanism, Scene, Signs, Site};
 pub use parameter::{Parameter, Thetas};

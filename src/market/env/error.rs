@@ -74,13 +74,25 @@ pub enum MarketEnvError {
         /// What to do.
         hint: &'static str,
     },
-    /// Something is to be drawn anew within an episode.
+    /// Something is to be drawn every so many steps.
     #[error(
-        "`{target}` is drawn anew within an episode\nhint: execution is drawn when an episode begins: say at = \"reset\""
+        "`{target}` is drawn anew every so many steps\nhint: a market goes on between steps: say at = {{ seconds = .. }} of its time"
     )]
-    Within {
+    BySteps {
         /// What is drawn.
         target: String,
+    },
+    /// Something is to be drawn in a regime that the data do not have.
+    #[error(
+        "`{target}` is drawn in regime {regime}, and there are {count}, counted from 0\nhint: the model of regimes of the features says how many there are"
+    )]
+    NoSuchRegime {
+        /// What is drawn.
+        target: String,
+        /// The regime.
+        regime: usize,
+        /// How many there are.
+        count: usize,
     },
     /// Something is to be drawn that the venue does not have.
     #[error(

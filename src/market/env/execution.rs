@@ -1,14 +1,20 @@
-//! Execution that is drawn anew for every episode: parameters of mechanisms, and latencies.
+//! Execution that is drawn anew for every episode, and within it: parameters of mechanisms, and latencies.
 
-use crate::market::{Execution, Latencies, Latency};
+use std::sync::Arc;
+
+use crate::market::redraws::{Drawing, LATENCIES, Place, Redraws, put};
+use crate::market::{Execution, Latencies};
 use crate::rl::{Episode, InfoChannel};
-use crate::sim2real::randomize::{DrawTable, Level, Occasion, Randomized, Randomizer, Redraw, Target, Turn};
-use crate::sim2real::{Assembly, Seed, Simulator, Twin};
+use crate::sim2real::randomize::{DrawKey, DrawTable, Level, Occasion, Randomizer, Redraw, Target, Turn};
+use crate::sim2real::{Assembly, Seed, Simulator, Timestamp, Twin};
 
 use super::error::MarketEnvError;
 
 /// Distributions over what stands between decision and fill. Targets are parameters of the venue's mechanisms, and `latency.feed`,
-/// `latency.order`, `latency.response` and `latency.compute` [s], which are then constant over an episode.
+/// `latency.order`, `latency.response` and `latency.compute` [s], which are then constant until they are drawn anew.
+///
+/// What is drawn within an episode is drawn every so many seconds of the market's time, or when a regime of the data is entered: the most
+/// probable one by the model of [`FeatureSettings::regimes`](super::FeatureSettings::regimes), as it is observed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnExecution {
     /// What is drawn, and how.
@@ -17,35 +23,35 @@ pub struct DrawnExecution {
     pub level: Level,
 }
 
-/// Where a drawn value goes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Place {
-    /// A parameter of the venue, by its number.
-    Venue(usize),
-    /// A latency, by its number.
-    Latency(usize),
-}
-
-/// The kinds of latencies that can be drawn.
-const LATENCIES: [&str; 4] = ["feed", "order", "response", "compute"];
-
 /// Draws for episodes.
 #[derive(Debug, Clone)]
 pub(super) struct Draws {
     execution: DrawnExecution,
     places: Vec<Place>,
     nominal: DrawTable,
+    /// When regimes of the data begin, and which.
+    regimes: Arc<[(Timestamp, usize)]>,
 }
 
 impl Draws {
-    /// Draws for runs at `venue`.
+    /// Draws for runs at `venue`, on data with these `regimes`, of which there are so many.
     ///
     /// # Errors
-    /// A parameter the venue does not have, or that is drawn anew within an episode.
-    pub fn new(execution: DrawnExecution, venue: &Assembly<Execution>) -> Result<Self, MarketEnvError> {
-        let within = |one: &&Randomized| !matches!(one.at, Redraw::Startup | Redraw::Reset);
-        if let Some(one) = execution.randomizer.randomized().iter().find(within) {
-            return Err(MarketEnvError::Within { target: one.target.to_string() });
+    /// A parameter the venue does not have, one that is drawn by steps, or in a regime that there is not.
+    pub fn new(
+        execution: DrawnExecution,
+        venue: &Assembly<Execution>,
+        (regimes, count): (Arc<[(Timestamp, usize)]>, usize),
+    ) -> Result<Self, MarketEnvError> {
+        for one in execution.randomizer.randomized() {
+            let target = || one.target.to_string();
+            match one.at {
+                Redraw::EverySteps(_) => return Err(MarketEnvError::BySteps { target: target() }),
+                Redraw::Regime(regime) if regime >= count => {
+                    return Err(MarketEnvError::NoSuchRegime { target: target(), regime, count });
+                }
+                _ => {}
+            }
         }
         let place = |target: &Target| {
             let latency = || LATENCIES.iter().position(|name| *name == target.parameter).map(Place::Latency);
@@ -60,7 +66,7 @@ impl Draws {
         };
         let targets = execution.randomizer.randomized().iter().map(|one| &one.target);
         let places = targets.map(place).collect::<Result<_, _>>()?;
-        Ok(Self { places, nominal: execution.randomizer.nominal(1), execution })
+        Ok(Self { places, nominal: execution.randomizer.nominal(1), execution, regimes })
     }
 
     /// What is drawn, with its unit.
@@ -69,13 +75,8 @@ impl Draws {
         all.map(|one| InfoChannel::new(one.target.to_string(), one.parameter.unit.clone())).collect()
     }
 
-    /// The venue and the latencies of an episode, and what was drawn for it.
-    pub fn draw(
-        &self,
-        episode: Episode,
-        venue: &Assembly<Execution>,
-        latencies: &Latencies,
-    ) -> (Assembly<Execution>, Latencies, Vec<f64>) {
+    /// What is drawn for an episode at `venue` with these `latencies`.
+    pub fn draw(&self, episode: Episode, venue: &Assembly<Execution>, latencies: &Latencies) -> DrawnEpisode {
         let DrawnExecution { randomizer, level } = &self.execution;
         let (seed, mut table) = (Seed(episode.seed), self.nominal.clone());
         let turn = |occasion, episode| (occasion, Turn { environment: 0, episode });
@@ -85,19 +86,21 @@ impl Draws {
         let drawn: Vec<f64> = table.environment(0).collect();
         let mut values: Vec<f64> = venue.parameters().iter().map(|parameter| parameter.nominal).collect();
         let mut latencies = latencies.clone();
-        for (place, value) in self.places.iter().zip(&drawn) {
-            match place {
-                Place::Venue(k) => values[*k] = *value,
-                Place::Latency(k) => {
-                    let Latencies { feed, order, response, compute, .. } = &mut latencies;
-                    if let Some(own) = [feed, order, response, compute].into_iter().nth(*k) {
-                        *own = Latency::Constant { seconds: value.clamp(0.0, Latency::LONGEST) };
-                    }
-                }
-            }
-        }
-        (venue.clone().with_values(&values), latencies, drawn)
+        self.places.iter().zip(&drawn).for_each(|(place, value)| put(*place, *value, &mut values, &mut latencies));
+        let drawing = Drawing { key: DrawKey::new(seed), episode: episode.number, level: *level };
+        let redraws = Redraws::of(randomizer, &self.places, &drawn, drawing, &self.regimes).map(Arc::new);
+        DrawnEpisode { venue: venue.clone().with_values(&values), latencies, drawn, redraws }
     }
+}
+
+/// What was drawn for an episode.
+pub(super) struct DrawnEpisode {
+    pub venue: Assembly<Execution>,
+    pub latencies: Latencies,
+    /// All that is drawn, in the order of [`Draws::channels`].
+    pub drawn: Vec<f64>,
+    /// What is drawn anew within it.
+    pub redraws: Option<Arc<Redraws>>,
 }
 
 /// The number of a parameter of `venue`.

@@ -156,6 +156,21 @@ impl Features {
         self.times.partition_point(|known| *known < time)
     }
 
+    /// When the most probable of so many regimes, the last features of a row, becomes another, and which: the lower of those that are
+    /// equally probable. Before the first row there is none.
+    pub fn regimes(&self, count: usize) -> Vec<(Timestamp, usize)> {
+        let first = self.width - count.min(self.width);
+        let mut begun: Vec<(Timestamp, usize)> = Vec::new();
+        for (row, known) in self.rows.chunks_exact(self.width.max(1)).zip(&self.times) {
+            let likelier = |best: usize, k: usize| if row[first + k] > row[first + best] { k } else { best };
+            let Some(now) = (0..count).reduce(likelier) else { break };
+            if begun.last().is_none_or(|(_, before)| *before != now) {
+                begun.push((*known, now));
+            }
+        }
+        begun
+    }
+
     /// Writes what is observed when so many rows have been seen; nothing but zeros before the first.
     #[inline]
     pub fn write(&self, seen: usize, into: &mut [f32]) {

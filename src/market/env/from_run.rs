@@ -11,7 +11,7 @@ impl MarketSetup {
     /// seed, are not asked: an episode has its own.
     ///
     /// # Errors
-    /// A run that is streamed; what [`prepare_run`] refuses, or what is refused of draws: parameters drawn anew within a run,
+    /// A run that is streamed; what [`prepare_run`] refuses, or what is refused of draws:
     /// mechanisms that need data there are none of, or that change which price orders meet.
     pub fn from_run(run: &RunFile) -> Result<Self, InputError> {
         if run.run.stream {
@@ -25,7 +25,6 @@ impl MarketSetup {
         }
         let (venue, document) = (backtest.venue(), run.document());
         let twin = randomized_twin(venue, document, run.randomize.as_ref(), run.posterior.as_ref(), &market_presets())?;
-        twin.check_drawn_once(document)?;
         run_needs::check(run, &twin.assembly, backtest.instruments(), backtest.histories())?;
         if backtest.settings().reference.is_none() && Reference::suiting(&twin.assembly) != Reference::suiting(venue) {
             let message =

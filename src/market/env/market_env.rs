@@ -251,7 +251,9 @@ impl<T: Task> Env for MarketEnv<T> {
     }
 
     fn privileged(&self, parameter: usize) -> f64 {
-        self.course.as_ref().and_then(|course| course.drawn.get(parameter).copied()).unwrap_or(f64::NAN)
+        let Some(course) = &self.course else { return f64::NAN };
+        let drawn = course.session.redrawn().unwrap_or(&course.drawn);
+        drawn.get(parameter).copied().unwrap_or(f64::NAN)
     }
 }
 

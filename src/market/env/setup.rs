@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use crate::market::Execution;
-use crate::market::{Backtest, Latencies};
+use crate::market::Backtest;
 use crate::rl::Episode;
-use crate::sim2real::{Assembly, Timestamp};
+use crate::sim2real::Timestamp;
+use crate::sim2real::regime::HiddenMarkov;
 
 use super::books::Books;
 use super::error::MarketEnvError;
-use super::execution::{DrawnExecution, Draws};
+use super::execution::{DrawnEpisode, DrawnExecution, Draws};
 use super::features::{FeatureSettings, Features};
 use super::pace::{Pace, Pacer};
 
@@ -26,7 +26,7 @@ pub struct MarketSetup {
     pub warm_up: usize,
     /// What is observed of the market.
     pub features: FeatureSettings,
-    /// What is drawn anew for every episode.
+    /// What is drawn anew for every episode, and within it.
     pub execution: Option<DrawnExecution>,
 }
 
@@ -123,7 +123,8 @@ impl Ready {
             each().map(|(history, steps)| Features::of(history, *steps, &features)).collect::<Result<Vec<_>, _>>()?;
         // Only an episode that begins in the midst needs to know what was displayed before.
         let books = each().map(|(history, steps)| length.and_then(|_| Books::of(history, *steps))).collect();
-        let draws = execution.map(|execution| Draws::new(execution, backtest.venue())).transpose()?;
+        let regimes = || regimes(&tables, &features);
+        let draws = execution.map(|execution| Draws::new(execution, backtest.venue(), regimes())).transpose()?;
         let starts = starts(&tables, pace, length, warm_up)?;
         Ok(Self { backtest: Arc::new(backtest), tables: Arc::new(tables), length, pace, warm_up, books, draws, starts })
     }
@@ -154,12 +155,13 @@ impl Ready {
             }
         };
         let settings = self.backtest.settings();
-        let (venue, latencies, drawn): (Assembly<Execution>, Latencies, Vec<f64>) = match &self.draws {
-            Some(draws) => draws.draw(episode, self.backtest.venue(), &settings.latencies),
-            None => (self.backtest.venue().clone(), settings.latencies.clone(), Vec::new()),
+        let (venue, latencies) = (self.backtest.venue(), &settings.latencies);
+        let DrawnEpisode { venue, latencies, drawn, redraws } = match &self.draws {
+            Some(draws) => draws.draw(episode, venue, latencies),
+            None => DrawnEpisode { venue: venue.clone(), latencies: latencies.clone(), drawn: vec![], redraws: None },
         };
         let settings = crate::market::Settings { seed: episode.seed(), latencies, ..settings.clone() };
-        let backtest = Arc::new(Backtest { venue, settings, ..Backtest::clone(&self.backtest) });
+        let backtest = Arc::new(Backtest { venue, settings, redraws, ..Backtest::clone(&self.backtest) });
         Ok(Beginning { backtest, drawn, from })
     }
 
@@ -182,6 +184,12 @@ impl Ready {
         }
         Ok(session)
     }
+}
+
+/// When regimes of the first instrument begin, and which, as far as was known by then; and how many there are.
+fn regimes(tables: &[Features], settings: &FeatureSettings) -> (Arc<[(Timestamp, usize)]>, usize) {
+    let count = settings.regimes.as_ref().map_or(0, HiddenMarkov::states);
+    (tables.first().map_or_else(Vec::new, |table| table.regimes(count)).into(), count)
 }
 
 /// The first row at which an episode may begin, and the number of such rows: behind the warm-up, and as far before the end as the

@@ -1,7 +1,7 @@
 //! What is randomized in the lanes of an environment, lane by lane, and what was drawn.
 
 use crate::rl::{Episode, Episodes, InfoChannel};
-use crate::sim2real::randomize::{DrawKey, DrawTable, Level, Occasion, Randomizer, Redraw, Target, Turn};
+use crate::sim2real::randomize::{DrawKey, DrawTable, Level, Occasion, Randomizer, Redraw, Turn, Within};
 use crate::sim2real::{Parameter, Seed, SplitMix64};
 
 /// What is randomized of an assembly.
@@ -20,10 +20,7 @@ pub struct Randomization {
 /// Parameters that are drawn anew together within an episode.
 #[derive(Debug, Clone)]
 struct Group {
-    at: Redraw,
-    randomizer: Randomizer,
-    /// Their rows among all.
-    rows: Vec<usize>,
+    own: Within,
     scratch: DrawTable,
     /// How often each lane has drawn them in its episode.
     drawn: Vec<u64>,
@@ -67,11 +64,12 @@ impl LaneParameters {
     pub(super) fn new(parameters: &[Parameter], randomization: Option<Randomization>, lanes: usize) -> Self {
         let nominal: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
         let scratch = randomization.as_ref().map(|r| r.randomizer.nominal(1));
-        let groups = randomization.as_ref().map_or_else(Vec::new, |r| groups(&r.randomizer, lanes));
+        let group = |own: Within| Group { scratch: own.randomizer.nominal(1), own, drawn: vec![0; lanes] };
+        let groups: Vec<Group> = randomization.iter().flat_map(|r| r.randomizer.within()).map(group).collect();
         let rows = randomization.as_ref().map_or(0, |r| r.places.len());
         let mut randomized = randomization.iter().flat_map(|r| r.randomizer.randomized());
         let startup = randomized.any(|one| one.at == Redraw::Startup);
-        let regime = |group: &Group| if let Redraw::Regime(k) = group.at { k + 1 } else { 0 };
+        let regime = |group: &Group| if let Redraw::Regime(k) = group.own.at { k + 1 } else { 0 };
         let count = groups.iter().map(regime).max().unwrap_or(0);
         let kept = if count > 0 { lanes } else { 0 };
         let regimes = Regimes {
@@ -172,7 +170,7 @@ impl LaneParameters {
         let switched = self.regimes.go_on(lane, step);
         let mut changed = false;
         for group in &mut self.groups {
-            let occasion = match group.at {
+            let occasion = match group.own.at {
                 Redraw::Regime(_) if switched => {
                     let now = self.regimes.now[lane].unwrap_or(usize::MAX);
                     Some(Occasion::Regime(now, self.regimes.entered[lane]))
@@ -187,8 +185,8 @@ impl LaneParameters {
             };
             let Some(occasion) = occasion else { continue };
             let turn = Turn { environment: 0, episode: episode.number };
-            group.randomizer.redraw_by(&mut group.scratch, 0, key, occasion, turn, self.levels[lane]);
-            for (row, value) in group.rows.iter().zip(group.scratch.environment(0)) {
+            group.own.randomizer.redraw_by(&mut group.scratch, 0, key, occasion, turn, self.levels[lane]);
+            for (row, value) in group.own.rows.iter().zip(group.scratch.environment(0)) {
                 self.values[lane * self.rows + row] = value;
             }
             changed = true;
@@ -238,29 +236,6 @@ impl Regimes {
     }
 }
 
-/// The parameters that are drawn within episodes, those of one interval together, and all regimes'.
-fn groups(whole: &Randomizer, lanes: usize) -> Vec<Group> {
-    let mut groups: Vec<Group> = Vec::new();
-    let alike = |a: Redraw, b: Redraw| a == b || matches!((a, b), (Redraw::Regime(_), Redraw::Regime(_)));
-    for one in whole.randomized() {
-        if matches!(one.at, Redraw::Startup | Redraw::Reset) || groups.iter().any(|group| alike(group.at, one.at)) {
-            continue;
-        }
-        let members = |k: &usize| alike(whole.randomized()[*k].at, one.at);
-        let rows: Vec<usize> = (0..whole.randomized().len()).filter(members).collect();
-        let randomized: Vec<_> = rows.iter().map(|k| whole.randomized()[*k].clone()).collect();
-        let within = |target: &Target| randomized.iter().any(|one| one.target == *target);
-        let correlations = whole.correlations().iter().filter(|pair| pair.between.iter().all(within)).cloned().collect();
-        // A part of what goes together goes together.
-        let Ok(randomizer) = Randomizer::new(randomized.clone(), correlations) else { continue };
-        // The last regime counts how many there are.
-        let last = randomized.iter().filter_map(|one| if let Redraw::Regime(k) = one.at { Some(k) } else { None }).max();
-        let at = last.map_or(one.at, Redraw::Regime);
-        groups.push(Group { at, scratch: randomizer.nominal(1), randomizer, rows, drawn: vec![0; lanes] });
-    }
-    groups
-}
-
 /// What an environment's copy of lanes needs of episodes.
 pub(super) fn copy_episode(own: &mut Episodes, other: Option<&Episodes>, from: usize, to: usize) {
     match other {
@@ -272,7 +247,7 @@ pub(super) fn copy_episode(own: &mut Episodes, other: Option<&Episodes>, from: u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim2real::randomize::{Distribution, Randomized};
+    use crate::sim2real::randomize::{Distribution, Randomized, Target};
 
     fn uniform(name: &'static str, at: Redraw) -> Randomized {
         let parameter = Parameter::new(name, "", 5.0);

@@ -8,6 +8,7 @@ use super::level::Level;
 use super::normal::{AT_ONCE, normal_parts, normal_quantile, normal_quantiles};
 use super::stream::{Occasion, name_key, uniform};
 use super::{Distribution, DrawTable, Randomized, Redraw};
+use crate::sim2real::elementary::{exp, ln_1p};
 
 /// A parameter made ready for many draws.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,8 +29,8 @@ pub(super) struct Entry {
 pub(super) enum Way {
     /// On a straight line.
     Straight,
-    /// By factors: the logarithm goes on a straight line, from that of the nominal value.
-    ByFactors { from: f64 },
+    /// By factors: the logarithm goes on a straight line.
+    ByFactors,
     /// From infinity, where a limit does nothing: the inverse goes on a straight line.
     FromInfinity,
     /// At once, with a probability as large as the level: between two choices there is nothing.
@@ -50,7 +51,7 @@ pub(super) fn way(one: &Randomized, name: &str) -> Way {
     match &one.distribution {
         Distribution::Choice { .. } => Way::AtOnce { key: name_key(&format!("{name}, whether at all")) },
         _ if nominal.is_infinite() => Way::FromInfinity,
-        distribution if distribution.by_factors() && nominal > 0.0 => Way::ByFactors { from: nominal.ln() },
+        distribution if distribution.by_factors() && nominal > 0.0 => Way::ByFactors,
         _ => Way::Straight,
     }
 }
@@ -145,13 +146,20 @@ impl Entry {
             return;
         }
         let part = level.get();
-        if part > 0.0 && self.way == Way::Straight {
-            // Without a question for each value.
-            row.iter_mut().zip(drawn).for_each(|(to, drawn)| *to = straight(self.nominal, drawn * self.factor, part));
-            return;
-        }
-        for ((to, drawn), key) in row.iter_mut().zip(drawn).zip(keys) {
-            *to = self.levelled(*key, drawn, level);
+        // Without a question for each value.
+        let (nominal, factor, values) = (self.nominal, self.factor, row.iter_mut().zip(drawn));
+        match self.way {
+            Way::Straight if part > 0.0 => {
+                values.for_each(|(to, drawn)| *to = straight(nominal, drawn * factor, part));
+            }
+            Way::ByFactors if part > 0.0 => {
+                values.for_each(|(to, drawn)| *to = by_factors(nominal, drawn * factor, part));
+            }
+            _ => {
+                for ((to, drawn), key) in values.zip(keys) {
+                    *to = self.levelled(*key, drawn, level);
+                }
+            }
         }
     }
 
@@ -167,11 +175,7 @@ impl Entry {
         }
         match self.way {
             Way::Straight => straight(self.nominal, full, part),
-            Way::ByFactors { from } if full > 0.0 => {
-                let way = (1.0 - part) * from + part * full.ln();
-                between(self.nominal, full, way.exp())
-            }
-            Way::ByFactors { .. } => straight(self.nominal, full, part),
+            Way::ByFactors => by_factors(self.nominal, full, part),
             Way::FromInfinity => full / part,
             Way::AtOnce { key: own } => {
                 if uniform(key, own) < part {
@@ -188,6 +192,17 @@ impl Entry {
 #[inline(always)]
 fn straight(one: f64, other: f64, part: f64) -> f64 {
     between(one, other, (1.0 - part) * one + part * other)
+}
+
+/// The same by factors, of numbers above 0; from 0 on, which no factor leads to, on a straight line.
+#[inline(always)]
+fn by_factors(one: f64, other: f64, part: f64) -> f64 {
+    let factor = (other / one).clamp(1e-300, 1e300);
+    let (inverse, falls) = (1.0 / factor, factor < 1.0);
+    let logarithm = ln_1p(if falls { inverse } else { factor } - 1.0);
+    let way = between(one, other, one * exp(part * if falls { -logarithm } else { logarithm }));
+    let line = straight(one, other, part);
+    if other > 0.0 { way } else { line }
 }
 
 /// `value`, which rounding may not lead beyond what it lies between.

@@ -23,6 +23,7 @@ mod randomizer;
 mod stream;
 mod table;
 mod target;
+mod within;
 
 pub use adr::{Adr, AdrChange, AdrError, AdrRange, AdrSample, AdrSettings, Boundary, End};
 pub use correlation::{Correlation, CorrelationError};
@@ -38,3 +39,4 @@ pub use randomizer::{RandomizeError, Randomizer, Turn};
 pub use stream::{DrawKey, Occasion};
 pub use table::DrawTable;
 pub use target::{Implausible, Randomized, Redraw, Target};
+pub use within::Within;
