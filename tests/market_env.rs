@@ -67,8 +67,8 @@ fn an_episode_is_the_backtest_of_what_is_done_in_it_to_the_last_bit() {
     assert!(fills > 100, "{fills} fills of quotes");
 }
 
-/// A rough market of which everything that can be drawn within an episode is: by the clock and with the regimes of its data.
-fn drawn_within(kind: DataKind) -> MarketSetup {
+/// A rough market, of which much is drawn within an episode: by the clock and with the regimes of its data.
+fn drawn_within(setup: MarketSetup) -> MarketSetup {
     let drawn = |id: &str, name: &'static str, (low, high): (f64, f64), at| Randomized {
         target: Target::of(id, name),
         parameter: Parameter::new(name, "", 0.5).within(0.0, 1e6),
@@ -86,14 +86,14 @@ fn drawn_within(kind: DataKind) -> MarketSetup {
         drawn("latency", "response", (0.0, 0.5), Redraw::Reset),
     ];
     let execution = DrawnExecution { randomizer: Randomizer::new(randomized, vec![]).unwrap(), level: Level::FULL };
-    MarketSetup::new(market(kind, 1, ROWS, true)).with_execution(execution)
+    setup.with_execution(execution)
 }
 
 #[test]
 fn what_is_drawn_within_an_episode_is_drawn_in_its_backtest() {
     for kind in [DataKind::Bars, DataKind::Quotes, DataKind::Book] {
         for (seed, length) in [(1, None), (2, Some(200))] {
-            let setup = || MarketSetup { length, ..drawn_within(kind) };
+            let setup = || drawn_within(MarketSetup { length, ..MarketSetup::new(market(kind, 1, ROWS, true)) });
             let record = same_as_in_a_backtest(env(setup(), portfolio(1)), seed, 800, &format!("{kind:?} drawn within"));
             assert!(!record.blotter.fills.is_empty());
             // A copy in the midst goes on with the same bits, and draws the same.
@@ -226,7 +226,8 @@ fn with_another_future(backtest: &Backtest, cut: Timestamp) -> Backtest {
 
 #[test]
 fn what_comes_later_changes_no_bit_of_what_was_observed() {
-    for kind in [DataKind::Bars, DataKind::Quotes, DataKind::Book] {
+    let kinds = [DataKind::Bars, DataKind::Quotes, DataKind::Book];
+    for (kind, drawn) in kinds.into_iter().flat_map(|kind| [(kind, false), (kind, true)]) {
         let backtest = market(kind, 1, ROWS, true);
         let history = &backtest.histories()[0];
         let last = history.bars().last().map(|bar| bar.known_at);
@@ -234,7 +235,8 @@ fn what_comes_later_changes_no_bit_of_what_was_observed() {
         let first = Timestamp(1_704_067_200 * Timestamp::NANOS);
         let cut = first + (last.0 - first.0) / 2;
         let run = |backtest: &Backtest| {
-            let mut env = env(MarketSetup::new(backtest.clone()), portfolio(1));
+            let setup = MarketSetup::new(backtest.clone());
+            let mut env = env(if drawn { drawn_within(setup) } else { setup }, portfolio(1));
             let time = env.about().channel("time").unwrap();
             let mut times = Vec::new();
             let mut numbers = Numbers(5);
