@@ -3,6 +3,7 @@
 use std::any::Any;
 use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::slice;
 
 use super::{Seed, SplitMix64};
 
@@ -116,6 +117,17 @@ impl LaneChange<'_> {
             Self::Load { lane, image } => image.load(&mut draws.lanes, lane),
         }
     }
+
+    /// What all lanes have in common, `anew` at the start of a run. It goes with whichever lane begins anew or is copied: laws that have
+    /// such a thing do either only where they have one lane.
+    pub fn shared<T: Clone + Send + 'static>(&self, own: &mut T, anew: impl FnOnce(Seed) -> T) {
+        match *self {
+            Self::Retune { .. } => {}
+            Self::Forget { seed, .. } => *own = anew(seed),
+            Self::Save { image, .. } => image.save(slice::from_ref(own), 0),
+            Self::Load { image, .. } => image.load(slice::from_mut(own), 0),
+        }
+    }
 }
 
 /// Draws of each lane by itself, for laws whose lanes are environments of their own.
@@ -164,6 +176,18 @@ mod tests {
             copy.memory(&mut memory);
         }
         assert_eq!((&parameters[..], &memory[..]), (&[3.0, 5.0, 3.0][..], &[Some(9), None, Some(9)][..]));
+    }
+
+    #[test]
+    fn what_lanes_share_begins_anew_and_is_copied_with_any_of_them() {
+        let (mut one, mut other) = (7, 8);
+        let image = LaneImage::default();
+        LaneChange::Retune { lane: 0, values: &[] }.shared(&mut one, |_| 0);
+        LaneChange::Save { lane: 0, image: &image }.shared(&mut one, |_| 0);
+        LaneChange::Load { lane: 3, image: &image }.shared(&mut other, |_| 0);
+        assert_eq!((one, other), (7, 7));
+        LaneChange::Forget { lane: 0, seed: Seed(5) }.shared(&mut one, |seed| seed.0);
+        assert_eq!(one, 5);
     }
 
     #[test]

@@ -213,8 +213,8 @@ pub trait Law<P: Plant>: DynClone + Send {
     fn sense_each(&mut self, times: &[f64], observations: &mut [P::Observation]) {
         self.sense(times.first().copied().unwrap_or_default(), observations);
     }
-    /// Changes one lane: shows `change` all that is kept by lanes. Laws of plants that no environment steps, as those of a market,
-    /// need none.
+    /// Changes one lane: shows `change` all that is kept by lanes. Every law implements it, be it of a robot or of a market; one that
+    /// keeps nothing by lanes needs nothing. The dynamics of a market's plant, `execution`, have no parameters that could change.
     fn change(&mut self, _change: &LaneChange<'_>) {}
     /// A quantity of its own that a sensor may show, in lane `lane`, such as the heat of a winding; none where it has none.
     fn told(&self, _lane: usize) -> Option<f64> {

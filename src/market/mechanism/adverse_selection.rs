@@ -1,7 +1,7 @@
 //! The price of waiting: resting orders fill most of all when the price is about to move through them.
 
 use crate::market::{Execution, ExecutionEffect, OrderLog, Role};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `price = reference + side * bps * mid / 1e4` for orders that rest: their short-run markout, the mean move of the mid against
 /// a passive fill, charged when it fills. Negative where fills are followed by moves in their favour.
@@ -56,11 +56,14 @@ impl Mechanism<Execution> for AdverseSelection {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
-        let seconds = if form == SHOWN { thetas.row(1).to_vec() } else { vec![0.0; thetas.lanes()] };
+        let seconds = if form == SHOWN { thetas.row(1).to_vec() } else { vec![AT_ONCE; thetas.lanes()] };
         let moves = vec![Moves::default(); thetas.lanes()];
         Box::new(Markout { bps: thetas.row(0).to_vec(), seconds, moves, last: 0.0 })
     }
 }
+
+/// How long the move takes where nobody looks at it [s].
+const AT_ONCE: f64 = 0.0;
 
 /// What a mid does against fills [bps]: what has come, and what is still to come.
 #[derive(Debug, Clone, Copy, Default)]
@@ -74,11 +77,18 @@ struct Markout {
     bps: Vec<f64>,
     seconds: Vec<f64>,
     moves: Vec<Moves>,
-    /// When the last row was [s].
+    /// When the last row was [s], of all lanes.
     last: f64,
 }
 
 impl Law<Execution> for Markout {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.bps);
+        change.derived(&mut self.seconds, |values| values.get(1).copied().unwrap_or(AT_ONCE));
+        change.memory(&mut self.moves);
+        change.shared(&mut self.last, |_| 0.0);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         let passed = (tick.time - self.last).max(0.0);
         self.last = self.last.max(tick.time);

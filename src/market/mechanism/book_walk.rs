@@ -1,7 +1,7 @@
 //! The price of size: an order larger than the touch takes the levels behind it.
 
 use crate::market::{Execution, ExecutionEffect, OrderLog};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
 
@@ -55,6 +55,10 @@ struct Walk {
 }
 
 impl Law<Execution> for Walk {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.fraction);
+    }
+
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         for (((effect, met), order), fraction) in
             effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.fraction)

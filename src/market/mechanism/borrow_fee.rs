@@ -1,7 +1,7 @@
 //! What it costs to be short: the fee of whoever lends the shares.
 
 use crate::market::{ChargeKind, Execution, OrderLog, Report, Role, Side};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Timestamp, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Seed, Site, Thetas, Timestamp, Typical};
 
 use super::Charging;
 
@@ -71,6 +71,10 @@ struct Loan {
 }
 
 impl Law<Execution> for Loan {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.annual_rate);
+    }
+
     fn sense(&mut self, _time: f64, reports: &mut [Report]) {
         for (report, rate) in reports.iter_mut().zip(&self.annual_rate) {
             if report.role == Role::Holder && report.side == Side::Sell {

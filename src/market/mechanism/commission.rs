@@ -1,7 +1,7 @@
 //! What the broker and the exchange charge.
 
 use crate::market::{Execution, OrderLog, Report, Role};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Seed, Site, Thetas, Typical};
 
 /// A commission on each order filled, in the form of the broker's schedule; negative for a rebate.
 ///
@@ -63,21 +63,8 @@ impl Mechanism<Execution> for Commission {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
-        let lane = |lane: usize| {
-            let value = |k: usize| thetas.row(k)[lane];
-            match form {
-                BPS => Schedule { maker_bps: value(0), taker_bps: value(0), ..Schedule::FREE },
-                PER_SHARE => Schedule { per_share: value(0), ..Schedule::FREE },
-                MINIMUM => Schedule { per_share: value(0), minimum: Some(value(1)), ..Schedule::FREE },
-                CAPPED => {
-                    let maximum_bps = value(2);
-                    Schedule { per_share: value(0), minimum: Some(value(1)), maximum_bps, ..Schedule::FREE }
-                }
-                PER_ORDER => Schedule { per_order: value(0), ..Schedule::FREE },
-                _ => Schedule { maker_bps: value(0), taker_bps: value(1), ..Schedule::FREE },
-            }
-        };
-        Box::new(Charge { schedules: (0..thetas.lanes()).map(lane).collect() })
+        let lane = |lane: usize| Schedule::of(form, |k| thetas.row(k)[lane]);
+        Box::new(Charge { form, schedules: (0..thetas.lanes()).map(lane).collect() })
     }
 }
 
@@ -101,6 +88,18 @@ impl Schedule {
     const FREE: Self =
         Self { maker_bps: 0.0, taker_bps: 0.0, per_share: 0.0, minimum: None, maximum_bps: f64::INFINITY, per_order: 0.0 };
 
+    /// That of form `form` where its parameters have these values.
+    fn of(form: usize, value: impl Fn(usize) -> f64) -> Self {
+        match form {
+            BPS => Self { maker_bps: value(0), taker_bps: value(0), ..Self::FREE },
+            PER_SHARE => Self { per_share: value(0), ..Self::FREE },
+            MINIMUM => Self { per_share: value(0), minimum: Some(value(1)), ..Self::FREE },
+            CAPPED => Self { per_share: value(0), minimum: Some(value(1)), maximum_bps: value(2), ..Self::FREE },
+            PER_ORDER => Self { per_order: value(0), ..Self::FREE },
+            _ => Self { maker_bps: value(0), taker_bps: value(1), ..Self::FREE },
+        }
+    }
+
     /// The fee of what `report` tells of [currency].
     fn fee(&self, report: &Report) -> f64 {
         let bps = if report.role == Role::Maker { self.maker_bps } else { self.taker_bps };
@@ -113,10 +112,16 @@ impl Schedule {
 
 #[derive(Clone)]
 struct Charge {
+    form: usize,
     schedules: Vec<Schedule>,
 }
 
 impl Law<Execution> for Charge {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        let form = self.form;
+        change.derived(&mut self.schedules, |values| Schedule::of(form, |k| values[k]));
+    }
+
     fn sense(&mut self, _time: f64, reports: &mut [Report]) {
         for (report, schedule) in reports.iter_mut().zip(&self.schedules) {
             if report.trades() && report.quantity > 0.0 {

@@ -1,7 +1,7 @@
 //! Funding: what those who are long a perpetual future pay those who are short.
 
 use crate::market::{ChargeKind, Execution, OrderLog, Report, Role};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Seed, Site, Thetas, Typical};
 
 use super::Charging;
 
@@ -67,6 +67,13 @@ struct Transfer {
 }
 
 impl Law<Execution> for Transfer {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.rate);
+        if let Some(intervals) = &mut self.intervals {
+            change.derived(intervals, |values| values[1] * HOUR);
+        }
+    }
+
     fn sense(&mut self, _time: f64, reports: &mut [Report]) {
         for (lane, (report, rate)) in reports.iter_mut().zip(&self.rate).enumerate() {
             if report.role != Role::Holder {

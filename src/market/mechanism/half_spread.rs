@@ -1,7 +1,7 @@
 //! The price of immediacy: an order that takes pays half the spread.
 
 use crate::market::{Execution, ExecutionEffect, OrderLog};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need};
 
@@ -64,6 +64,10 @@ struct Concession {
 }
 
 impl Law<Execution> for Concession {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.size);
+    }
+
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         for (((effect, met), order), size) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.size) {
             if !order.takes() {

@@ -1,7 +1,7 @@
 //! Orders come in whole lots.
 
 use crate::market::{Execution, ExecutionEffect};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `quantity filled = lot * floor(quantity / lot)`, after any limit on participation; what is left lapses.
 ///
@@ -49,6 +49,10 @@ struct Lots {
 }
 
 impl Law<Execution> for Lots {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.lot);
+    }
+
     fn act(&mut self, _tick: Tick, _scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         for (effect, lot) in effects.iter_mut().zip(&self.lot) {
             effect.lot = effect.lot.max(*lot);

@@ -16,6 +16,8 @@ mod permanent_impact;
 mod propagator;
 mod queue_position;
 #[cfg(test)]
+mod retune_tests;
+#[cfg(test)]
 mod schedule;
 mod sqrt_impact;
 mod stale_quotes;

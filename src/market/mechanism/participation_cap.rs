@@ -1,7 +1,7 @@
 //! A limit on the part of the market's volume an order may be.
 
 use crate::market::{Execution, InFlight, OrderLog};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
 
@@ -55,6 +55,10 @@ struct Cap {
 }
 
 impl Law<Execution> for Cap {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.fraction);
+    }
+
     fn shape(&mut self, _tick: Tick, orders: &mut [InFlight]) {
         for (order, fraction) in orders.iter_mut().zip(&self.fraction) {
             order.participation_limit = order.participation_limit.min(*fraction);

@@ -1,7 +1,7 @@
 //! Impact that stays: the price every later order of one's own meets.
 
 use crate::market::{Execution, ExecutionEffect, OrderLog};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
 use super::propagator::paid;
@@ -96,6 +96,14 @@ struct Displaced {
 }
 
 impl Law<Execution> for Displaced {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.bps);
+        if let Some(paid) = &mut self.paid {
+            change.parameter(1, paid);
+        }
+        change.memory(&mut self.traded);
+    }
+
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         let lanes = self.bps.iter().zip(&mut self.traded).enumerate();
         for (((effect, met), order), (lane, (bps, traded))) in

@@ -4,7 +4,7 @@ use std::f64::consts::LN_2;
 
 use statrs::function::gamma::ln_gamma;
 
-use crate::sim2real::Parameter;
+use crate::sim2real::{LaneChange, Parameter};
 
 /// The part of what an order moves that it pays itself, in forms that state it. No fit moves it: fills and mids that follow them
 /// say nothing of it that a spread and an impact of the order's own do not say.
@@ -57,6 +57,26 @@ impl Propagator {
         Self { slowest: LEAST.exp() / lag, modes, staying: (below / all, 0.0) }
     }
 
+    /// Shows `change` the kernels of all lanes, each of which is `of` its lane's parameters. Where these change, what is left stays
+    /// what it is, in each exponential of the kernel, and goes on at the new rates.
+    pub fn change(lanes: &mut [Self], change: &LaneChange<'_>, of: impl FnOnce(&[f64]) -> Self) {
+        match *change {
+            LaneChange::Retune { lane, values } => {
+                if let Some(own) = lanes.get_mut(lane) {
+                    let mut new = of(values);
+                    new.parts().zip(own.parts()).for_each(|((_, left), (_, kept))| *left = *kept);
+                    *own = new;
+                }
+            }
+            LaneChange::Forget { lane, .. } => {
+                if let Some(own) = lanes.get_mut(lane) {
+                    own.parts().for_each(|(_, left)| *left = 0.0);
+                }
+            }
+            LaneChange::Save { .. } | LaneChange::Load { .. } => change.derived(lanes, of),
+        }
+    }
+
     /// Lets `seconds` [s] pass.
     pub fn pass(&mut self, seconds: f64) {
         let mut gone = self.gone(seconds);
@@ -92,9 +112,14 @@ impl Propagator {
 
     /// Moves the price by `size`.
     pub fn kick(&mut self, size: f64) {
-        for (weight, left) in self.modes.iter_mut().chain([&mut self.staying]) {
+        for (weight, left) in self.parts() {
             *left += *weight * size;
         }
+    }
+
+    /// Each weight, and what is left in it.
+    fn parts(&mut self) -> impl Iterator<Item = &mut (f64, f64)> {
+        self.modes.iter_mut().chain([&mut self.staying])
     }
 
     /// What is left of all kicks.
@@ -135,6 +160,30 @@ mod tests {
         }
         assert_eq!(after(Propagator::exponential(f64::INFINITY), 1e9), 1.0);
         assert!((after(Propagator::power(1.0, 0.0), 1e9) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn another_kernel_keeps_what_is_left_and_lets_it_go_at_its_own_rates() {
+        let mut lanes = [Propagator::power(2.0, 0.4), Propagator::power(2.0, 0.4)];
+        lanes.iter_mut().for_each(|kernel| kernel.kick(3.0));
+        let slower = LaneChange::Retune { lane: 1, values: &[4.0, 0.4] };
+        Propagator::change(&mut lanes, &slower, |values| Propagator::power(values[0], values[1]));
+        assert_eq!(lanes[0].left(), lanes[1].left());
+        // Of a lag of twice the time as much is left after twice the time.
+        assert!((lanes[1].left_after(20.0) - lanes[0].left_after(10.0)).abs() < 1e-12);
+        lanes[1].pass(20.0);
+        let left = lanes[1].left();
+        let steeper = LaneChange::Retune { lane: 1, values: &[1.0, 0.9] };
+        Propagator::change(&mut lanes, &steeper, |values| Propagator::power(values[0], values[1]));
+        assert_eq!(lanes[1].left(), left);
+        // The next kick has the new kernel's shape.
+        let before = lanes[1].left_after(5.0);
+        lanes[1].kick(1.0);
+        assert!((lanes[1].left_after(5.0) - before - after(Propagator::power(1.0, 0.9), 5.0)).abs() < 1e-12);
+        Propagator::change(&mut lanes, &LaneChange::Forget { lane: 1, seed: Default::default() }, |_| {
+            Propagator::exponential(1.0)
+        });
+        assert_eq!(lanes[1].left(), 0.0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The price of coming late: more stands ahead of a resting order than is displayed when it joins.
 
 use crate::market::{Execution, ExecutionEffect, OrderLog, Role};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
 
@@ -60,6 +60,10 @@ struct Ahead {
 }
 
 impl Law<Execution> for Ahead {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.fraction);
+    }
+
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         for (((effect, met), order), fraction) in
             effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.fraction)

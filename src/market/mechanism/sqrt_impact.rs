@@ -1,7 +1,7 @@
 //! Impact that grows with the square root of the size.
 
 use crate::market::{Execution, ExecutionEffect, OrderLog};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
 
@@ -59,6 +59,10 @@ struct Impact {
 }
 
 impl Law<Execution> for Impact {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.bps);
+    }
+
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         for (((effect, met), order), bps) in effects.iter_mut().zip(scene.inputs).zip(scene.commands).zip(&self.bps) {
             if !order.takes() {

@@ -1,7 +1,7 @@
 //! Old news: whoever decides sees quotes that are older than the backtest thinks.
 
 use crate::market::{Execution, InFlight, OrderLog};
-use crate::sim2real::{About, Assembly, Form, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Assembly, Form, LaneChange, Law, Mechanism, Parameter, Seed, Site, Thetas, Tick, Typical};
 
 /// `seen(t) = market(t - seconds)`: what an order is decided on is so old when it is decided.
 ///
@@ -73,6 +73,10 @@ struct Aged {
 }
 
 impl Law<Execution> for Aged {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.seconds);
+    }
+
     fn shape(&mut self, _tick: Tick, orders: &mut [InFlight]) {
         for (order, seconds) in orders.iter_mut().zip(&self.seconds) {
             order.seen_until = order.seen_until.plus_seconds(-seconds);

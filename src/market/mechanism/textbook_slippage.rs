@@ -3,7 +3,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::market::{Execution, ExecutionEffect};
-use crate::sim2real::{About, Draws, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Draws, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need};
 
@@ -25,7 +25,7 @@ pub struct TextbookSlippage;
 impl Mechanism<Execution> for TextbookSlippage {
     fn about(&self) -> About {
         About {
-            name: "textbook_slippage",
+            name: NAME,
             site: Site::Plant,
             title: "the textbook's slippage",
             law: "slippage = base_bps / 1e4 + volume_impact * Q / V + noise of noise_bps; 5 bps, 0.01 and 2 bps if nothing is said",
@@ -57,9 +57,12 @@ impl Mechanism<Execution> for TextbookSlippage {
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, seed: Seed) -> Box<dyn Law<Execution>> {
-        Box::new(Slippage::new(thetas, Some(seed.stream("textbook_slippage"))))
+        Box::new(Slippage::new(thetas, Some(seed.stream(NAME))))
     }
 }
+
+/// Id, and the stream its noise is drawn from.
+const NAME: &str = "textbook_slippage";
 
 /// `base_bps` [bps], `volume_impact` [] and `noise_bps` [bps] where nothing is said.
 const TEXTBOOK: [f64; 3] = [5.0, 0.01, 2.0];
@@ -87,6 +90,15 @@ impl Slippage {
 }
 
 impl Law<Execution> for Slippage {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.base_bps);
+        change.parameter(1, &mut self.volume_impact);
+        change.parameter(2, &mut self.noise_bps);
+        if let Some(draws) = &mut self.draws {
+            change.shared(draws, |seed| seed.stream(NAME));
+        }
+    }
+
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         if !scene.commands.iter().any(|order| order.takes()) {
             return;

@@ -1,7 +1,7 @@
 //! Impact that decays: the price one's own next orders meet, the less of it the later they come.
 
 use crate::market::{Execution, ExecutionEffect, OrderLog};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
 use super::propagator::{Propagator, paid};
@@ -85,20 +85,12 @@ impl Mechanism<Execution> for TransientImpact {
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<Execution>> {
         let exponential = form.is_multiple_of(SHOWN);
-        let kernel = |lane: usize| match exponential {
-            true => Propagator::exponential(thetas.row(1)[lane]),
-            false => Propagator::power(thetas.row(1)[lane], thetas.row(2)[lane]),
-        };
         let paid = match form < SHOWN {
             true => vec![HALF; thetas.lanes()],
-            false => thetas.row(if exponential { 2 } else { 3 }).to_vec(),
+            false => thetas.row(paid_at(exponential)).to_vec(),
         };
-        Box::new(Decaying {
-            bps: thetas.row(0).to_vec(),
-            paid,
-            displaced: (0..thetas.lanes()).map(kernel).collect(),
-            last: f64::NEG_INFINITY,
-        })
+        let displaced = (0..thetas.lanes()).map(|lane| kernel(exponential, |k| thetas.row(k)[lane])).collect();
+        Box::new(Decaying { exponential, bps: thetas.row(0).to_vec(), paid, displaced, last: f64::NEG_INFINITY })
     }
 }
 
@@ -111,18 +103,37 @@ impl Demanding for TransientImpact {
 /// What an order pays of what it moves where that is spread evenly over the prices it takes.
 const HALF: f64 = 0.5;
 
+/// The kernel of a form where its parameters have these values.
+fn kernel(exponential: bool, value: impl Fn(usize) -> f64) -> Propagator {
+    if exponential { Propagator::exponential(value(1)) } else { Propagator::power(value(1), value(2)) }
+}
+
+/// The number of `paid` among the parameters of a form that has it: it follows those of the kernel.
+const fn paid_at(exponential: bool) -> usize {
+    if exponential { 2 } else { 3 }
+}
+
 #[derive(Clone)]
 struct Decaying {
+    exponential: bool,
     bps: Vec<f64>,
     /// The part of what an order moves that it pays itself.
     paid: Vec<f64>,
     /// What is left of own impact [bps].
     displaced: Vec<Propagator>,
-    /// When the last order met the market [s].
+    /// When the last order met the market [s], of all lanes.
     last: f64,
 }
 
 impl Law<Execution> for Decaying {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        let exponential = self.exponential;
+        change.parameter(0, &mut self.bps);
+        change.derived(&mut self.paid, |values| values.get(paid_at(exponential)).copied().unwrap_or(HALF));
+        Propagator::change(&mut self.displaced, change, |values| kernel(exponential, |k| values[k]));
+        change.shared(&mut self.last, |_| f64::NEG_INFINITY);
+    }
+
     fn act(&mut self, tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         // Nothing is displaced before the first order, and no order comes before one that came before it.
         let seconds = if self.last.is_finite() { (tick.time - self.last).max(0.0) } else { 0.0 };

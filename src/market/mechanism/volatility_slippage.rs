@@ -1,7 +1,7 @@
 //! A concession in proportion to how much the price moves.
 
 use crate::market::{Execution, ExecutionEffect, InFlight, OrderLog};
-use crate::sim2real::{About, Form, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
+use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 use super::need::{Demanding, Need, known};
 
@@ -71,6 +71,10 @@ struct Slippage {
 }
 
 impl Law<Execution> for Slippage {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.fraction);
+    }
+
     fn act(&mut self, _tick: Tick, scene: &Scene<'_, Execution>, effects: &mut [ExecutionEffect]) {
         for ((effect, order), fraction) in effects.iter_mut().zip(scene.commands).zip(&self.fraction) {
             let sigma = if self.form == RECENT { order.recent_volatility } else { order.daily_volatility };
