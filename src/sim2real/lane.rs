@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn what_lanes_share_begins_anew_and_is_copied_with_any_of_them() {
-        let (mut one, mut other) = (7, 8);
+        let (mut one, mut other) = (7_u64, 8_u64);
         let image = LaneImage::default();
         LaneChange::Retune { lane: 0, values: &[] }.shared(&mut one, |_| 0);
         LaneChange::Save { lane: 0, image: &image }.shared(&mut one, |_| 0);

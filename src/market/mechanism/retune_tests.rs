@@ -4,7 +4,7 @@ use super::MECHANISMS;
 use super::schedule::{DAILY, MID};
 use crate::market::{Book, Execution, ExecutionEffect, InFlight, Level, Met, Report, Role, Side};
 use crate::sim2real::{
-    Dynamics, Form, LaneChange, LaneImage, Law, Mechanism, Scene, Seed, Thetas, Tick, Timestamp, Typical,
+    Dynamics, Form, LaneChange, LaneImage, Law, Mechanism, Parameter, Scene, Seed, Thetas, Tick, Timestamp, Typical,
 };
 
 /// Orders that take and that rest, looks at the mid and positions of more than a day, at uneven times [s].
@@ -16,7 +16,7 @@ fn orders() -> Vec<(f64, InFlight)> {
         let side = if k % 5 < 3 { Side::Buy } else { Side::Sell };
         let at = Timestamp(0).plus_seconds(72_000.0 + time);
         let role = roles[k % roles.len()];
-        let under_way = if role == Role::Holder { 108_000.0 } else { 0.25 };
+        let under_way = if role == Role::Holder { 144_000.0 } else { 0.25 };
         let quantity = 900.0 + 1_700.0 * (k % 4) as f64;
         let order = InFlight {
             average_daily_volume: Some(DAILY),
@@ -59,7 +59,7 @@ fn run(law: &mut dyn Law<Execution>, lanes: usize, orders: &[(f64, InFlight)]) -
 
 /// Values at which a form acts.
 fn acting(form: &Form, share: f64) -> Vec<f64> {
-    let value = |p: &crate::sim2real::Parameter| p.starts.last().copied().unwrap_or(0.5 * p.upper);
+    let value = |p: &Parameter| p.starts.last().copied().unwrap_or(0.5 * p.upper);
     form.parameters.iter().map(|p| (share * value(p)).clamp(p.lower, p.upper)).collect()
 }
 
