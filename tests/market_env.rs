@@ -97,7 +97,8 @@ fn what_is_drawn_within_an_episode_is_drawn_in_its_backtest() {
             let record = same_as_in_a_backtest(env(setup(), portfolio(1)), seed, 800, &format!("{kind:?} drawn within"));
             assert!(!record.blotter.fills.is_empty());
             // A copy in the midst goes on with the same bits, and draws the same.
-            let mut one = env(setup().with_pace(Pace::Seconds(9.0)), portfolio(1));
+            let paced = MarketSetup { length: None, ..setup() }.with_pace(Pace::Seconds(5.0));
+            let mut one = env(paced, portfolio(1));
             played(&mut one, Episode { seed, number: 2 }, 5, at_random(seed));
             let mut other = one.clone();
             let go_on = |env: &mut MarketEnv<Portfolio>| {
