@@ -145,20 +145,23 @@ impl Entry {
             row.iter_mut().zip(drawn).for_each(|(to, drawn)| *to = drawn * factor);
             return;
         }
-        let part = level.get();
-        // Without a question for each value.
-        let (nominal, factor, values) = (self.nominal, self.factor, row.iter_mut().zip(drawn));
-        match self.way {
-            Way::Straight if part > 0.0 => {
-                values.for_each(|(to, drawn)| *to = straight(nominal, drawn * factor, part));
+        let (part, nominal, factor) = (level.get(), self.nominal, self.factor);
+        let by_itself = matches!(self.way, Way::Straight | Way::ByFactors) && part > 0.0;
+        if !by_itself {
+            for ((to, drawn), key) in row.iter_mut().zip(drawn).zip(keys) {
+                *to = self.levelled(*key, drawn, level);
             }
-            Way::ByFactors if part > 0.0 => {
-                values.for_each(|(to, drawn)| *to = by_factors(nominal, drawn * factor, part));
+            return;
+        }
+        // Without a question for each value, and in loops of their own: compilers make vector instructions of short ones.
+        row.iter_mut().zip(drawn).for_each(|(to, drawn)| *to = drawn * factor);
+        if self.way == Way::Straight {
+            for to in row {
+                *to = straight(nominal, *to, part);
             }
-            _ => {
-                for ((to, drawn), key) in values.zip(keys) {
-                    *to = self.levelled(*key, drawn, level);
-                }
+        } else {
+            for to in row {
+                *to = by_factors(nominal, *to, part);
             }
         }
     }
