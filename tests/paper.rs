@@ -107,7 +107,12 @@ fn killed_at_any_instant_it_comes_to_the_same_orders_and_fills() {
         ("killed-lines", "--feed -", Some(lines.as_slice())),
         ("killed-lines-synced", "--feed - --sync always", Some(lines.as_slice())),
     ];
-    for (out, arguments, feed) in ways {
+    // A fast machine comes to the end before it has been killed often: then once more.
+    for (round, (out, arguments, feed)) in (0..5).flat_map(|round| ways.map(|way| (round, way))) {
+        if round > 0 && kills >= 30 {
+            break;
+        }
+        let out = &if round == 0 { out.to_owned() } else { format!("{out}-{round}") };
         let times = killed_over_and_over(&folder, out, arguments, feed, &mut walk);
         println!("{out}: killed {times} times, {} orders, {} fills", orders.len(), fills.len());
         same_tables(&folder, "backtest", out);
