@@ -242,25 +242,30 @@ pub(super) fn each_block<X: Ends>(model: &HiddenMarkov, evaluated: Evaluated, st
     let mut values = vec![f64x2::ZERO; model.states() * LANES / 2];
     for from in (0..steps.count).step_by(size) {
         steps.columns::<X>(from, &mut columns);
-        let into = bytemuck::cast_slice_mut(&mut values);
+        let into: &mut [[f64; LANES]] = bytemuck::cast_slice_mut(&mut values);
         evaluate(densities, evaluated, &columns, into);
         see(Block { from, count: size.min(steps.count - from), values: bytemuck::cast_slice(&values) });
     }
 }
 
 /// Evaluates rows side by side, `[column][row]`, in each state, `[state][row]`.
-pub(super) fn evaluate(densities: &Densities, evaluated: Evaluated, columns: &[[f64; LANES]], into: &mut [[f64; LANES]]) {
+pub(super) fn evaluate<const N: usize>(
+    densities: &Densities,
+    evaluated: Evaluated,
+    columns: &[[f64; N]],
+    into: &mut [[f64; N]],
+) {
     Arch::new().dispatch(Evaluation { densities, evaluated, columns, into });
 }
 
-struct Evaluation<'a> {
+struct Evaluation<'a, const N: usize> {
     densities: &'a Densities,
     evaluated: Evaluated,
-    columns: &'a [[f64; LANES]],
-    into: &'a mut [[f64; LANES]],
+    columns: &'a [[f64; N]],
+    into: &'a mut [[f64; N]],
 }
 
-impl NullaryFnOnce for Evaluation<'_> {
+impl<const N: usize> NullaryFnOnce for Evaluation<'_, N> {
     type Output = ();
 
     // What is not inlined here is compiled without the processor's vectors.

@@ -5,13 +5,16 @@
 use std::ops::Range;
 
 use super::Observations;
-use super::ends::LANES;
 
 /// Strands that are taken side by side.
 pub(super) const STRANDS: usize = 8;
 
-/// Steps that are evaluated at once.
-pub(super) const BLOCK: usize = LANES / STRANDS;
+/// Steps that are evaluated at once: with fewer the recursion stops too often, with more what is evaluated of several columns is too much
+/// at once.
+pub(super) const BLOCK: usize = 32;
+
+/// Numbers of each step of a block, `[step][lane]`.
+pub(super) type Rows = [f64; BLOCK * STRANDS];
 
 /// Where the strands of a series are.
 #[derive(Debug, Clone, Copy)]
@@ -62,7 +65,7 @@ impl<'a> Strands<'a> {
     }
 
     /// Writes the rows of [`BLOCK`] steps from step `from` of the run-in on, `[column][step][lane]`; NaN where there is none.
-    pub fn columns(&self, from: usize, into: &mut [[f64; LANES]]) {
+    pub fn columns(&self, from: usize, into: &mut [Rows]) {
         let written = match self.series.width() {
             1 => self.full::<1>(from, into),
             2 => self.full::<2>(from, into),
@@ -77,7 +80,7 @@ impl<'a> Strands<'a> {
 
     /// The same where all lanes have rows of few columns in each step, which is almost always; `None` where they have not.
     #[inline(always)]
-    fn full<const W: usize>(&self, from: usize, into: &mut [[f64; LANES]]) -> Option<()> {
+    fn full<const W: usize>(&self, from: usize, into: &mut [Rows]) -> Option<()> {
         let mut parts = [&[[0.0; W]; BLOCK]; STRANDS];
         for (lane, part) in parts.iter_mut().enumerate() {
             let rows = self.rows(lane, self.between(lane, from..from + BLOCK)?);
@@ -104,7 +107,7 @@ impl<'a> Strands<'a> {
         known.then(|| before + steps.start - self.run_in..before + end - self.run_in)
     }
 
-    fn column(&self, lane: usize, from: usize, into: &mut [[f64; LANES]]) {
+    fn column(&self, lane: usize, from: usize, into: &mut [Rows]) {
         let rows = self.between(lane, from..from + BLOCK).map_or(0..0, |between| self.rows(lane, between));
         let count = BLOCK.min(self.run_in + self.length - from);
         let part = self.series.slice(rows.start, rows.end);

@@ -7,8 +7,8 @@ use std::ops::Range;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::densities::{Evaluated, evaluate};
-use super::ends::{LANES, PerState};
-use super::strands::{BLOCK, STRANDS, Strands};
+use super::ends::PerState;
+use super::strands::{BLOCK, Rows, STRANDS, Strands};
 use super::{HiddenMarkov, Observations};
 
 /// Steps of which choices are kept in one word.
@@ -66,7 +66,8 @@ impl<'a> Ways<'a> {
     fn of<N: PerState>(model: &HiddenMarkov, strands: Strands<'a>) -> Self {
         let (states, rows) = (model.states(), strands.lanes() * strands.length - strands.behind());
         let end = strands.run_in + strands.length;
-        let (mut columns, mut values) = (vec![[f64::NAN; LANES]; model.width()], vec![[0.0; LANES]; states]);
+        let (mut columns, mut values) =
+            (vec![[f64::NAN; BLOCK * STRANDS]; model.width()], vec![[0.0; BLOCK * STRANDS]; states]);
         let transition = transitions(model);
         let nothing = vec![[0.0; STRANDS]; states];
         let mut scores = Scores { best: nothing.clone(), next: nothing.clone() };
@@ -254,7 +255,7 @@ fn transitions(model: &HiddenMarkov) -> Vec<Each<f64>> {
 /// Goes on over some steps, and keeps where paths come from.
 struct Choice<'a, N> {
     /// Logarithms of densities, `[state][step][lane]`.
-    values: &'a [[f64; LANES]],
+    values: &'a [Rows],
     steps: Range<usize>,
     /// Of the first of them: its bit in words.
     number: usize,
