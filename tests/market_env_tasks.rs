@@ -214,6 +214,8 @@ fn what_cannot_be_drawn_within_an_episode_is_refused() {
     };
     let told = refused(Redraw::EverySteps(3));
     assert!(told.starts_with("`commission.bps` is drawn anew every so many steps\nhint: "), "{told}");
+    let told = refused(Redraw::EverySeconds(1e-6));
+    assert!(told.contains("a time between draws") && told.contains("0.000001"), "{told}");
     let told = refused(Redraw::Regime(2));
     assert!(told.starts_with("`commission.bps` is drawn in regime 2, and there are 2, counted from 0\nhint: "), "{told}");
 }

@@ -77,19 +77,15 @@ impl Redraws {
                 let after = seconds * time as f64 * Timestamp::NANOS as f64;
                 (after < i64::MAX as f64).then(|| Timestamp(origin.0.saturating_add(after as i64)))
             }
-            // The regime that the run begins in comes first.
-            Redraw::Regime(_) => {
-                let first = self.regimes.partition_point(|(at, _)| *at <= origin).saturating_sub(1);
-                self.regimes.get(first + time as usize - 1).map(|(at, _)| (*at).max(origin))
-            }
+            Redraw::Regime(_) => self.regime(time, origin).map(|(at, _)| at.max(origin)),
             Redraw::Startup | Redraw::Reset | Redraw::EverySteps(_) => None,
         }
     }
 
-    /// The regime that begins at the time of this number, from 1.
-    fn regime(&self, time: u64, origin: Timestamp) -> usize {
+    /// When the regime of this number, from 1, begins, and which it is; the one that the run begins in comes first.
+    fn regime(&self, number: u64, origin: Timestamp) -> Option<(Timestamp, usize)> {
         let first = self.regimes.partition_point(|(at, _)| *at <= origin).saturating_sub(1);
-        self.regimes.get(first + time as usize - 1).map_or(usize::MAX, |(_, regime)| *regime)
+        self.regimes.get(first + number as usize - 1).copied()
     }
 }
 
@@ -141,7 +137,10 @@ impl Redrawn {
         self.times[group] += 1;
         let (own, time) = (&self.plan.groups[group], self.times[group]);
         let occasion = match own.at {
-            Redraw::Regime(_) => Occasion::Regime(self.plan.regime(time, self.origin), time),
+            Redraw::Regime(_) => {
+                let regime = self.plan.regime(time, self.origin);
+                Occasion::Regime(regime.map_or(usize::MAX, |(_, regime)| regime), time)
+            }
             _ => Occasion::Interval(time),
         };
         let (turn, scratch) = (Turn { environment: 0, episode: self.plan.episode }, &mut self.scratch[group]);

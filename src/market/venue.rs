@@ -177,9 +177,7 @@ impl Venue {
         let floors = setup.symbols.iter().enumerate().map(floor).collect();
         Self { floors, conceding, charges, of_laws: law_parameters(assembly) }
     }
-}
 
-impl Venue {
     /// Laws have these values of all parameters from now on; what they remember stays.
     pub fn retune(&mut self, values: &[f64]) {
         self.floors.iter_mut().for_each(|floor| floor.run.retune_laws(&self.of_laws, 0, values));

@@ -23,6 +23,9 @@ pub struct DrawnExecution {
     pub level: Level,
 }
 
+/// Shortest time between draws [s].
+const SHORTEST: f64 = 1e-3;
+
 /// Draws for episodes.
 #[derive(Debug, Clone)]
 pub(super) struct Draws {
@@ -47,6 +50,11 @@ impl Draws {
             let target = || one.target.to_string();
             match one.at {
                 Redraw::EverySteps(_) => return Err(MarketEnvError::BySteps { target: target() }),
+                Redraw::EverySeconds(seconds) if seconds < SHORTEST => {
+                    let hint =
+                        "what is drawn more often than data come is met by nobody: give a thousandth of a second or more";
+                    return Err(MarketEnvError::Value { what: "a time between draws", value: seconds, hint });
+                }
                 Redraw::Regime(regime) if regime >= count => {
                     return Err(MarketEnvError::NoSuchRegime { target: target(), regime, count });
                 }

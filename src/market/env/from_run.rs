@@ -11,8 +11,8 @@ impl MarketSetup {
     /// seed, are not asked: an episode has its own.
     ///
     /// # Errors
-    /// A run that is streamed; what [`prepare_run`] refuses, or what is refused of draws:
-    /// mechanisms that need data there are none of, or that change which price orders meet.
+    /// A run that is streamed; what [`prepare_run`] refuses, or what is refused of draws: mechanisms that need
+    /// data there are none of, or that change which price orders meet.
     pub fn from_run(run: &RunFile) -> Result<Self, InputError> {
         if run.run.stream {
             let error =
