@@ -1,6 +1,7 @@
 //! Diagnoses of recordings in which the generator concealed an effect, in laws and with integrators of its own.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails where a value is missing")]
 
+use rand_distr::{Distribution, StandardNormal};
 use rayon::ThreadPoolBuilder;
 use trueup::conceal::servo::{Excitation, Servo, ServoEffect};
 use trueup::conceal::{Column, Table};
@@ -81,6 +82,34 @@ fn nothing_is_named_where_only_parameters_are_off() {
         assert!(outcome.diagnosis.effects.is_empty());
         let fit = &outcome.diagnosis.fit[0];
         assert!(fit.recalibrated_rmse < 1.3 * fit.noise_floor && fit.nominal_rmse > 3.0 * fit.noise_floor);
+    }
+}
+
+/// What is simulated foretells no noise; were what is measured taken for the motion, noise that remembers itself would foretell
+/// itself, and a complete diagnosis would be called unexplained.
+#[test]
+fn noise_that_remembers_itself_is_not_foretold_by_the_motion() {
+    for (seed, remembers) in [(120, 0.9), (122, 0.75)] {
+        let mut rng = Seed(seed).stream("coloured");
+        let mut recorded = |excitation, seed| {
+            let mut recording = recording(&[ServoEffect::TYPICAL[0]], excitation, seed, 5_000);
+            let mut noise = 0.0;
+            for sample in recording.measured[0].samples.iter_mut().flatten() {
+                let fresh: f64 = StandardNormal.sample(&mut rng);
+                noise = remembers * noise + (1.0 - remembers * remembers).sqrt() * 0.006 * fresh;
+                *sample += noise;
+            }
+            [recording]
+        };
+        let fitted = recorded(Excitation::SinesAndSteps, seed);
+        let held_out = recorded(Excitation::ChirpAndSteps, seed + 1);
+        let outcome = diagnose(&twin(), &fitted, &held_out, Seed(1), &|_, _, _| ());
+        assert_eq!(names(&outcome), ["coulomb_friction"], "{:#?}", outcome.diagnosis);
+        assert!(matches!(outcome.diagnosis.verdict, Verdict::Named | Verdict::Ambiguous), "{}", outcome.diagnosis.summary);
+        let notes = &outcome.diagnosis.checks.notes;
+        let foretold = notes.iter().find_map(|note| note.strip_prefix("a regression on the motion foretells ")).unwrap();
+        let percent: f64 = foretold.split(' ').next().unwrap().parse().unwrap();
+        assert!(percent < 10.0, "{foretold}");
     }
 }
 

@@ -21,6 +21,10 @@ impl DelayLine<Signal> for HeldLine {
     fn pass(&mut self, tick: Tick, seconds: f64, command: &mut Signal) {
         command.0 = self.mean(tick, seconds, command.0);
     }
+
+    fn at_rest() -> Self {
+        Self::at_zero()
+    }
 }
 
 /// The commands of a recording, one a row.

@@ -6,7 +6,9 @@ use std::any::Any;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::{Candidate, Channel, Clock, Covariate, Parameter, Recording, Seed, Signs, Simulator, Thetas, Trajectory, Twin};
+use super::{
+    Candidate, Channel, Clock, Covariate, Measured, Parameter, Recording, Seed, Signs, Simulator, Thetas, Trajectory, Twin,
+};
 
 /// A twin, whatever its kind.
 #[derive(Clone)]
@@ -16,7 +18,8 @@ pub(in crate::sim2real) struct AnyTwin(Arc<dyn Methods>);
 #[derive(Clone)]
 pub(in crate::sim2real) struct AnyStimulus(Arc<dyn Any + Send + Sync>);
 
-/// Recordings of one kind as those of any. They are not to be changed: what was measured is kept twice.
+/// Recordings of one kind as those of any. They are not to be changed, for what was measured is kept twice, but
+/// [`resampled`](Simulator::resampled).
 pub(in crate::sim2real) fn any_recordings<S: Clone + Send + Sync + 'static>(
     all: &[Recording<S>],
 ) -> Vec<Recording<AnyStimulus>> {
@@ -137,6 +140,10 @@ impl<T: Twin> Simulator for Kind<T> {
     fn excited(&self, like: &Recording<AnyStimulus>, time: Vec<f64>, commands: Vec<f64>) -> Option<Recording<AnyStimulus>> {
         self.0.excited(self.own(like), time, commands).map(any_recording)
     }
+
+    fn resampled(&self, recording: &Recording<AnyStimulus>, measured: Vec<Measured>) -> Recording<AnyStimulus> {
+        any_recording(self.0.resampled(self.own(recording), measured))
+    }
 }
 
 impl<T: Twin> Methods for Kind<T> {
@@ -240,6 +247,10 @@ impl Simulator for AnyTwin {
         commands: Vec<f64>,
     ) -> Option<Recording<AnyStimulus>> {
         self.0.excited(recording, time, commands)
+    }
+
+    fn resampled(&self, recording: &Recording<AnyStimulus>, measured: Vec<Measured>) -> Recording<AnyStimulus> {
+        self.0.resampled(recording, measured)
     }
 }
 

@@ -92,11 +92,16 @@ impl LaneChange<'_> {
 
     /// `column` has what is remembered of each lane; the default is nothing.
     pub fn memory<T: Clone + Default + Send + 'static>(&self, column: &mut [T]) {
+        self.memory_from(column, &T::default());
+    }
+
+    /// The same of a memory that begins as `fresh`.
+    pub fn memory_from<T: Clone + Send + 'static>(&self, column: &mut [T], fresh: &T) {
         match *self {
             Self::Retune { .. } => {}
             Self::Forget { lane, .. } => {
                 if let Some(own) = column.get_mut(lane) {
-                    *own = T::default();
+                    own.clone_from(fresh);
                 }
             }
             Self::Save { lane, image } => image.save(column, lane),

@@ -42,6 +42,12 @@ pub trait Command: Clone + PartialEq + Send + Sync + 'static {
 pub trait DelayLine<C>: Clone + Default + Send {
     /// Replaces `command`, sent during `tick`, by what arrives then through a delay of `seconds` [s].
     fn pass(&mut self, tick: Tick, seconds: f64, command: &mut C);
+
+    /// A line on which there was nothing before the first command, where a line may know of what was before.
+    #[must_use]
+    fn at_rest() -> Self {
+        Self::default()
+    }
 }
 
 /// What a plant lets one see: a row of channels.

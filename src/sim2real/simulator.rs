@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{About, Channel, Clock, Covariate, Form, Parameter, Recording, Seed, Signs, Thetas, Trajectory};
+use super::{About, Channel, Clock, Covariate, Form, Measured, Parameter, Recording, Seed, Signs, Thetas, Trajectory};
 
 /// Something that follows a recording and says what it would have measured.
 ///
@@ -73,6 +73,10 @@ pub trait Simulator: Send + Sync {
         _commands: Vec<f64>,
     ) -> Option<Recording<Self::Stimulus>> {
         None
+    }
+    /// `recording` with other samples: simulated ones, say, in the place of those that were measured.
+    fn resampled(&self, recording: &Recording<Self::Stimulus>, measured: Vec<Measured>) -> Recording<Self::Stimulus> {
+        Recording { measured, ..recording.clone() }
     }
 }
 

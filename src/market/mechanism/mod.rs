@@ -50,7 +50,7 @@ use super::Execution;
 
 /// The market's registry.
 pub static MECHANISMS: Registry<Execution> = &[
-    &CommandDelay { longest: 60.0, starts: &[0.001, 0.01, 0.05, 0.1, 0.25, 0.5, 1.0], smooth: false },
+    &CommandDelay { longest: 60.0, starts: &[0.001, 0.01, 0.05, 0.1, 0.25, 0.5, 1.0], holds: false },
     &ParticipationCap,
     &LotSize,
     &HalfSpread,

@@ -197,7 +197,7 @@ fn wires<'a>(setting: &'a Setting<CartPole>) -> Option<Wires> {
     let mut at = assembly.own().len();
     for (mechanism, form, parameters) in assembly.mechanisms() {
         match mechanism.about().name {
-            "command_delay" if wires.delay.is_none() => wires.delay = Some(at),
+            "command_delay" if wires.delay.is_none() && form == 0 => wires.delay = Some(at),
             "noise" if wires.noise.is_none() && form == 0 => wires.noise = Some(at),
             _ => return None,
         }

@@ -61,7 +61,7 @@ macro_rules! rows {
         signals, delays $delays:expr, rates $rates:expr, plant [$($own:expr),*], sensor [$($read:expr),*]
     ) => {
         &[
-            &CommandDelay { longest: $delays.0, starts: $delays.1, smooth: true },
+            &CommandDelay { longest: $delays.0, starts: $delays.1, holds: true },
             &DeadZone,
             &Saturation,
             &ActuatorLag,

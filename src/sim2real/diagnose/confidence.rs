@@ -20,18 +20,39 @@ const MOST_EVIDENCE: f64 = 1e4;
 const BY_REMAINDER: f64 = -1.78;
 /// On the number of mechanisms named beside it: the more, the likelier it is that one stands for what another lacks.
 const BY_OTHERS: f64 = -0.97;
+/// On the number of its parameters that ran to the edge of what they may be: a law that has to be stretched so far is hardly the one.
+const BY_EDGE: f64 = -1.5;
+/// On how implausible the twin's own parameters have become beside it, beyond what is usual where a name is right: what is lost in
+/// twice the logarithm of their density.
+const BY_IMPLAUSIBILITY: f64 = -0.2;
+const USUAL: f64 = 6.0;
 /// Nothing that is fitted is surer than this.
 const SUREST: f64 = 0.99;
 
+/// What speaks against a name, beside its rivals.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Doubts {
+    /// The part of the misfit that is left on held-out data.
+    pub remainder: f64,
+    /// Number of mechanisms named beside it.
+    pub others: usize,
+    /// Number of its parameters at the edge of what they may be.
+    pub at_edge: usize,
+    /// How implausible the twin's own parameters have become.
+    pub implausibility: f64,
+}
+
 /// Probabilities of the selected mechanism and of each rival, as their evidence is to its; what the registry lacks has the
-/// rest. `remainder` is the part of the misfit that is left on held-out data, and `others` mechanisms are named beside it.
-pub(super) fn calibrated(place: &Place, remainder: f64, others: usize) -> (f64, Vec<f64>) {
+/// rest.
+pub(super) fn calibrated(place: &Place, doubts: &Doubts) -> (f64, Vec<f64>) {
     let evidence = |e: f64, most: f64| (1.0 + e.clamp(0.0, most)).ln();
     let odds = BASE
         + BY_MARGIN * evidence(place.nearest.unwrap_or(WIDEST), WIDEST)
         + BY_GAIN * evidence(place.gain, MOST_EVIDENCE)
-        + BY_REMAINDER * remainder.clamp(0.0, 1.0)
-        + BY_OTHERS * others as f64;
+        + BY_REMAINDER * doubts.remainder.clamp(0.0, 1.0)
+        + BY_OTHERS * doubts.others as f64
+        + BY_EDGE * doubts.at_edge as f64
+        + BY_IMPLAUSIBILITY * (doubts.implausibility - USUAL).max(0.0);
     // Of two that explain the same neither is surer than the other.
     let found = 1.0 / (1.0 + (-odds).exp());
     let (share, others) = by_evidence(place);
@@ -67,13 +88,23 @@ mod tests {
     #[test]
     fn what_is_left_unexplained_and_near_rivals_cost_confidence() {
         let place = |gain, loss: f64| Place { gain, nearest: Some(loss), others: vec![(1, loss)] };
-        let (clear, others) = calibrated(&place(5_000.0, 4_000.0), 0.0, 0);
+        let sure = Doubts::default();
+        let (clear, others) = calibrated(&place(5_000.0, 4_000.0), &sure);
         assert!(clear > 0.95 && others[0] < 1e-6, "{clear}");
-        let (tied, others) = calibrated(&place(60.0, 0.0), 0.0, 0);
+        let (tied, others) = calibrated(&place(60.0, 0.0), &sure);
         assert!((0.2..0.7).contains(&tied) && others[0] > 0.3, "{tied} {others:?}");
         assert!(tied + others[0] < 1.0, "something unknown is always possible");
-        assert!(calibrated(&place(5_000.0, 4_000.0), 0.9, 0).0 < clear - 0.1);
-        assert!(calibrated(&place(5_000.0, 4_000.0), 0.0, 2).0 < clear - 0.1);
-        assert!(calibrated(&place(12.0, 9.0), 0.0, 0).0 < 0.9);
+        let doubtful = [
+            Doubts { remainder: 0.9, ..sure },
+            Doubts { others: 2, ..sure },
+            Doubts { at_edge: 1, ..sure },
+            Doubts { implausibility: 15.0, ..sure },
+        ];
+        for doubts in &doubtful {
+            assert!(calibrated(&place(5_000.0, 4_000.0), doubts).0 < clear - 0.05, "{doubts:?}");
+        }
+        let usual = Doubts { implausibility: 4.0, ..sure };
+        assert_eq!(calibrated(&place(5_000.0, 4_000.0), &usual).0, clear);
+        assert!(calibrated(&place(12.0, 9.0), &sure).0 < 0.9);
     }
 }

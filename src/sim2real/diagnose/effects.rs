@@ -1,12 +1,13 @@
 //! What is found, with its parameters, how sure it is and what else it could be.
 
 use super::Found;
-use super::confidence::{by_evidence, calibrated};
+use super::confidence::{Doubts, by_evidence, calibrated};
 use super::diagnosis::{Effect, Estimate, Rival};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::Place;
 use super::verdict::{Findings, held_out_remainder};
-use crate::sim2real::{Candidate, Twin};
+use super::weigh::plausibility;
+use crate::sim2real::{Candidate, Parameter, Twin};
 
 /// Confidence in what needs no fit to be seen.
 const CERTAIN_BY_SIGHT: f64 = 0.99;
@@ -23,6 +24,7 @@ pub(super) fn fitted<T: Twin>(
 ) -> Vec<Effect> {
     let mut at = inquiry.twin.parameters().len();
     let unseen = findings.fits.iter().map(held_out_remainder).fold(0.0, f64::max);
+    let implausibility = -plausibility(inquiry, &findings.trued.values);
     let fitted = selected.added.iter().filter(|number| !inquiry.candidates[**number].finishing).count();
     let mut effects: Vec<Effect> = Vec::new();
     for (number, place) in selected.added.iter().zip(places) {
@@ -30,7 +32,11 @@ pub(super) fn fitted<T: Twin>(
         let (confidence, others) = match candidate.finishing {
             // Steps are seen; that they fit is no more than a check.
             true => (CERTAIN_BY_SIGHT, Vec::new()),
-            false if findings.sampled => calibrated(place, unseen, fitted.saturating_sub(1)),
+            false if findings.sampled => {
+                let at_edge = at_edge(&candidate.form.parameters, at, findings);
+                let others = fitted.saturating_sub(1);
+                calibrated(place, &Doubts { remainder: unseen, others, at_edge, implausibility })
+            }
             false => by_evidence(place),
         };
         let parameters = candidate
@@ -68,6 +74,14 @@ pub(super) fn fitted<T: Twin>(
     }
     effects.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
     effects
+}
+
+/// Number of a law's `parameters`, the first of which is the twin's `from`-th, that ran to the edge of what they may be. A bound at
+/// which a parameter does nothing is no edge: there the law is a simpler one.
+fn at_edge(parameters: &[Parameter], from: usize, findings: &Findings) -> usize {
+    let of = |k: &usize| parameters.get(k.checked_sub(from)?).map(|p| (p, findings.trued.values[*k]));
+    let nailed = findings.trued.at_bound.iter().filter_map(of);
+    nailed.filter(|(p, value)| (value - p.nominal).abs() > 1e-2 * p.scale() && value.abs() > 1e-2 * p.scale()).count()
 }
 
 /// What a sign in the recordings shows without a fit.

@@ -272,9 +272,10 @@ impl<'a, 'b, T: Twin> Design<'a, 'b, T> {
         let rows = 0..recording.len();
         let run = truth.twin.rollout(&Thetas::single(&lane), recording, rows, self.inquiry.seed).pop()?;
         let commands = self.inquiry.twin.commands(recording)?;
-        let mut measured = self.inquiry.twin.excited(recording, recording.time.clone(), commands)?;
+        let blank = self.inquiry.twin.excited(recording, recording.time.clone(), commands)?;
         let first = &self.inquiry.evidence.weights.first()?.channel;
-        for channel in &mut measured.measured {
+        let mut samples = blank.measured.clone();
+        for channel in &mut samples {
             let Some(simulated) = run.iter().find(|s| s.channel == channel.channel) else { continue };
             let [low, high] = self.within;
             let safe = |v: &f64| !must || channel.channel != *first || (low..=high).contains(v);
@@ -283,6 +284,6 @@ impl<'a, 'b, T: Twin> Design<'a, 'b, T> {
             }
             channel.samples = simulated.samples.iter().map(|v| Some(*v)).collect();
         }
-        Some(measured)
+        Some(self.inquiry.twin.resampled(&blank, samples))
     }
 }

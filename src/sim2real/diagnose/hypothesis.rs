@@ -81,6 +81,48 @@ impl<T: Twin> Inquiry<'_, T> {
         self.fitted(twin, added, &starts, Some(&parent.fit.state), effort)
     }
 
+    /// `less`, which is `whole` without one of its mechanisms, with what was `screened` in its place.
+    ///
+    /// `less` was refitted without that mechanism, and may have been bent so far that no fit finds back from there: it is begun
+    /// from where `whole` stands, too.
+    pub fn instead(
+        &self,
+        whole: &Hypothesis<T>,
+        less: &Hypothesis<T>,
+        screened: &Screened,
+        effort: Effort,
+    ) -> Hypothesis<T> {
+        let twin = less.twin.with(&self.candidates[screened.number]);
+        let mut starts = apart(&screened.starts, twin.parameters());
+        starts.extend(self.in_place(whole, less, screened));
+        let added = less.added.iter().copied().chain([screened.number]).collect();
+        self.fitted(twin, added, &starts, Some(&less.fit.state), effort)
+    }
+
+    /// Where `whole` stands, with another of its mechanisms at its most promising start instead of the one that `less` lacks, and
+    /// with what both call alike as it was.
+    fn in_place(&self, whole: &Hypothesis<T>, less: &Hypothesis<T>, screened: &Screened) -> Option<Vec<f64>> {
+        let place = (0..whole.added.len()).find(|i| {
+            let others = whole.added.iter().enumerate().filter(|(k, _)| k != i).map(|(_, number)| *number);
+            others.eq(less.added.iter().copied())
+        })?;
+        let count = |number: &usize| self.candidates[*number].form.parameters.len();
+        let from = self.twin.parameters().len() + whole.added[..place].iter().map(count).sum::<usize>();
+        let own = from..from + count(&whole.added[place]);
+        let mut values = whole.fit.values[..own.start].to_vec();
+        values.extend_from_slice(&whole.fit.values[own.end..]);
+        values.extend_from_slice(screened.starts.first()?.get(values.len()..)?);
+        let shared = values.len() - count(&screened.number);
+        let (before, after) = (&self.candidates[whole.added[place]], &self.candidates[screened.number]);
+        for (value, parameter) in values[shared..].iter_mut().zip(&after.form.parameters) {
+            let alike = |p: &Parameter| p.name == parameter.name && p.unit == parameter.unit;
+            if let Some(k) = before.form.parameters.iter().position(alike) {
+                *value = whole.fit.values[own.start + k].clamp(parameter.lower, parameter.upper);
+            }
+        }
+        Some(values)
+    }
+
     /// `whole` without the `position`-th of its mechanisms, refitted from the joint solution and from the twin as given.
     pub fn without(&self, whole: &Hypothesis<T>, position: usize) -> Hypothesis<T> {
         let added: Vec<usize> =

@@ -9,7 +9,7 @@ use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
 use super::whiteness;
 use crate::sim2real::identify::{Block, Problem, State};
-use crate::sim2real::{Clock, Covariate, Part, Recording, Twin};
+use crate::sim2real::{Clock, Covariate, Measured, Part, Recording, Twin};
 
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
 pub(super) const NEAR_THE_NOISE: f64 = 1.5;
@@ -67,9 +67,9 @@ pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<
         Some(seconds) => inquiry.evidence.held_out.iter().flat_map(|p| p.windows(seconds)).collect(),
         None => inquiry.evidence.held_out.clone(),
     };
-    let mut simulated: BTreeMap<usize, Recording<T::Stimulus>> = BTreeMap::new();
-    for part in inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out) {
-        simulated.entry(identity(part.recording)).or_insert_with(|| part.recording.clone());
+    let mut simulated: BTreeMap<usize, Simulated<'_, T::Stimulus>> = BTreeMap::new();
+    for Part { recording, .. } in inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out) {
+        simulated.entry(identity(recording)).or_insert_with(|| (recording, recording.measured.clone()));
     }
     let mut left = |parts: &[Part<'_, T::Stimulus>], state: &State| -> Vec<Left> {
         let problem = inquiry.problem(&selected.twin, parts);
@@ -93,22 +93,27 @@ pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<
         begun.values = held_out.iter().map(settled).collect();
     }
     let (fitted, unseen) = (left(&inquiry.evidence.compared, &selected.fit.state), left(&held_out, &begun));
-    let covariates: BTreeMap<usize, Vec<Covariate>> =
-        simulated.iter().map(|(identity, recording)| (*identity, inquiry.twin.covariates(recording))).collect();
+    let of_motion = |(recording, samples): Simulated<'_, T::Stimulus>| -> Vec<Covariate> {
+        inquiry.twin.covariates(&inquiry.twin.resampled(recording, samples))
+    };
+    let covariates = simulated.into_iter().map(|(identity, one)| (identity, of_motion(one))).collect();
     regression(&fitted, &unseen, &covariates)
 }
+
+/// A recording, and its samples as they were simulated.
+type Simulated<'a, S> = (&'a Recording<S>, Vec<Measured>);
 
 /// Puts what was simulated in the place of what was measured.
 fn follow<T: Twin>(
     problem: &Problem<'_, T>,
     blocks: &[Block],
     residual: &DVector<f64>,
-    simulated: &mut BTreeMap<usize, Recording<T::Stimulus>>,
+    simulated: &mut BTreeMap<usize, Simulated<'_, T::Stimulus>>,
 ) {
     for block in blocks {
         let noise = problem.weights.iter().find(|w| w.channel == block.channel).map_or(0.0, |w| w.noise);
-        let recording = simulated.get_mut(&identity(problem.parts[block.part].recording));
-        let channel = recording.and_then(|r| r.measured.iter_mut().find(|m| m.channel == block.channel));
+        let of_recording = simulated.get_mut(&identity(problem.parts[block.part].recording));
+        let channel = of_recording.and_then(|(_, samples)| samples.iter_mut().find(|m| m.channel == block.channel));
         let Some(channel) = channel else { continue };
         for (row, at) in block.rows.iter().zip(block.range.clone()) {
             if let Some(sample) = &mut channel.samples[*row] {

@@ -6,7 +6,7 @@ use super::confidence::by_evidence;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::select::Selection;
-use super::weigh::{SHARE, completes, gain, lead, pursued, share};
+use super::weigh::{SHARE, completes, evidence, gain, lead, pursued, share};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
@@ -35,7 +35,7 @@ pub(super) struct Place {
 const SWAPS: usize = 4;
 
 /// A further mechanism that explains little, and is no more likely than this beside its rivals, is not worth a name ...
-const ANYBODYS: f64 = 0.4;
+const ANYBODYS: f64 = 0.5;
 /// ... where what is left without it has at most this many times the mean square of the noise.
 const HARDLY_LEFT: f64 = 2.0;
 
@@ -175,7 +175,7 @@ fn loss<T: Twin>(
     if other.contains.contains(&own.name) && rival.free() > selected.free() {
         let slight = share(first, selected, rival) < SLIGHT && !completes(selected, rival);
         return match slight {
-            true => loss.max(0.5 * WITHIN),
+            true => evidence(inquiry, first, selected, rival).max(0.5 * WITHIN),
             // Of messages laws have the form they are written in: what comes near may well be the one.
             false if inquiry.twin.clock() == Clock::Event => loss,
             false => loss + WITHIN,

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::forms::reformed;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
-use super::weigh::{gain, lead, needed, needed_share, ranked, squares};
+use super::weigh::{gain, lead, needed, needed_share, pursued, ranked, squares};
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
 use crate::sim2real::identify::Effort;
@@ -217,8 +217,9 @@ impl<T: Twin> Selection<T> {
     pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
         let less = &self.without[place];
         let screened = inquiry.screened(less).into_iter().find(|s| s.number == other)?;
-        let (recalibrated, selected, without) =
-            pruned(inquiry, &self.recalibrated, vec![inquiry.extended(less, other, &screened, Effort::Thorough)]);
+        // On the way on which it was found to be better.
+        let whole = pursued(inquiry, &self.recalibrated, &self.selected, less, &screened);
+        let (recalibrated, selected, without) = pruned(inquiry, &self.recalibrated, vec![whole]);
         // A simpler law is preferred although it explains a little less.
         let simpler = selected.free() < self.selected.free()
             && self.selected.added.get(place).is_some_and(|own| {

@@ -28,16 +28,21 @@ const TOLERATED: f64 = 0.03;
 const NEXT_TO_NOTHING: f64 = 0.01;
 /// The evidence between two that say the same in as many constants is no more than this.
 const INDIFFERENT: f64 = 1.0;
+/// Degrees of freedom of what a twin says of its parameters' uncertainty.
+const FREEDOM: f64 = 4.0;
 /// Numbers of effective residuals whose ratio is smaller than this differ by their own scatter.
 const AS_WHITE: f64 = 1.25;
+/// Where residuals are so correlated that few are effective, that number is known to a standard deviation of this over its root, for
+/// it is a sum of correlations over many lags (Sokal, "Monte Carlo methods in statistical mechanics", 1997).
+const SCATTER: f64 = 4.0;
 /// Residuals that differ by less than this part say the same; their numbers of effective residuals differ by more.
 const ALIKE_LEFT: f64 = 0.05;
 
 /// Hypotheses by what the evidence says of them, best first.
 ///
 /// Each is weighed with its own number of effective residuals, for the right one leaves whiter ones. But those that leave
-/// nearly as little as the one that leaves least, or nearly as white, are weighed with the number of that one: their own would
-/// rank them by its scatter.
+/// nearly as little as the one that leaves least, or as white, are weighed with the number of that one: their own would rank
+/// them by its scatter.
 pub(super) fn ranked<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     reference: &Hypothesis<T>,
@@ -69,27 +74,53 @@ fn alike<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesi
     apart <= TOLERATED * noise && apart <= NEXT_TO_NOTHING * (squares(first) - squares(a).min(squares(b)))
 }
 
-/// By whose number of effective residuals `one` is weighed beside `best`.
+/// By whose number of effective residuals `one` is weighed beside `best`, which leaves least: its own only where it is less white. What
+/// leaves more does not hold more evidence for being whiter, and were it otherwise, of three each might be preferred to the next.
 fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypothesis<T> {
-    let effective = |h: &Hypothesis<T>| h.misfits.iter().map(ChannelMisfit::effective).sum::<f64>();
-    let ratio = effective(one) / effective(best).max(1e-300);
-    let as_white = (1.0 / AS_WHITE..AS_WHITE).contains(&ratio);
+    let effective = |h: &Hypothesis<T>| h.misfits.iter().map(ChannelMisfit::effective).sum::<f64>().max(1e-300);
+    let (own, of_best) = (effective(one), effective(best));
+    let scatter = AS_WHITE.max(1.0 + SCATTER / own.min(of_best).sqrt());
+    let as_white = own * scatter > of_best;
     if as_white || squares(one) <= (1.0 + ALIKE_LEFT) * squares(best) { best } else { one }
 }
 
 /// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other.
 pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
-    let best = if squares(a) <= squares(b) { a } else { b };
-    let lead = weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best));
+    let lead = evidence(inquiry, first, a, b);
     if !alike(inquiry, first, a, b) {
         return lead;
     }
-    // What says the same is told apart by its length alone.
-    let effective: f64 = 1.0 + best.misfits.iter().map(ChannelMisfit::effective).sum::<f64>();
+    // What says the same is told apart by its length, or by how far the twin's own parameters have to be from what it says of them.
     match b.free() as f64 - a.free() as f64 {
-        0.0 => lead.clamp(-INDIFFERENT, INDIFFERENT),
-        longer => longer * effective.ln(),
+        0.0 => {
+            lead.clamp(-INDIFFERENT, INDIFFERENT) + plausibility(inquiry, &a.fit.values)
+                - plausibility(inquiry, &b.fit.values)
+        }
+        longer => {
+            let best = if squares(a) <= squares(b) { a } else { b };
+            longer * (1.0 + best.misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln()
+        }
     }
+}
+
+/// The same by what they leave alone, also where that is alike.
+pub(super) fn evidence<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    a: &Hypothesis<T>,
+    b: &Hypothesis<T>,
+) -> f64 {
+    let best = if squares(a) <= squares(b) { a } else { b };
+    weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best))
+}
+
+/// Twice the logarithm of how plausible the twin's own parameters are, by a Student's t distribution about what the twin says: what
+/// is said of uncertainties is uncertain too.
+pub(super) fn plausibility<T: Twin>(inquiry: &Inquiry<'_, T>, values: &[f64]) -> f64 {
+    let parameters = inquiry.twin.parameters().iter().zip(values);
+    let distances =
+        parameters.filter_map(|(p, value)| p.prior.filter(|std| *std > 0.0).map(|std| (value - p.nominal) / std));
+    distances.map(|z| -(FREEDOM + 1.0) * (z * z / FREEDOM).ln_1p()).sum()
 }
 
 /// The least part of the parent's residual that a further mechanism has to explain to be needed.
@@ -152,7 +183,7 @@ pub(super) fn needed<T: Twin>(
         || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), last)| {
             let explained = less.sum_of_squares - last.sum_of_squares;
             let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
-            explained >= share_of(whole.added.len()) * all || explained >= COMPLETES * left
+            explained >= share_of(whole.added.len()) * all || !less.like_noise() && explained >= COMPLETES * left
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let change = || (0..rows).map(|i| less.fit.residual[i] - whole.fit.residual[i]);
@@ -193,7 +224,7 @@ fn weighed<T: Twin>(
     gain - (alternative.free() as f64 - null.free() as f64) * effective.ln()
 }
 
-/// `less` with another candidate: fitted to its end if it comes near `best` in a few steps.
+/// `less`, which is a part of `best`, with another candidate: fitted to its end if it comes near `best` in a few steps.
 pub(super) fn pursued<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     first: &Hypothesis<T>,
@@ -201,6 +232,6 @@ pub(super) fn pursued<T: Twin>(
     less: &Hypothesis<T>,
     one: &Screened,
 ) -> Hypothesis<T> {
-    let briefly = inquiry.extended(less, one.number, one, Effort::Brief);
+    let briefly = inquiry.instead(best, less, one, Effort::Brief);
     if lead(inquiry, first, best, &briefly) < HOPELESS { inquiry.refitted(&briefly) } else { briefly }
 }

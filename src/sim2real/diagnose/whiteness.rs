@@ -29,6 +29,11 @@ impl ChannelMisfit {
         (self.sum_of_squares - level * self.count as f64).max(0.0)
     }
 
+    /// Whether it is of the size and the colour of coloured noise: then nothing more need be sought in it.
+    pub fn like_noise(&self) -> bool {
+        self.level > 1.0 && self.within(1.0 + BY_CHANCE, self.level)
+    }
+
     /// Whether the mean square is at most `times` that of noise of mean square `level`.
     pub fn within(&self, times: f64, level: f64) -> bool {
         self.sum_of_squares <= times * level * self.count as f64
@@ -61,7 +66,9 @@ pub(super) fn channel_misfits(residual: &[f64], blocks: &[Block], rounding: impl
                 count,
                 autocorrelation_time: 1.0 + coloured * (time - 1.0),
                 level: match covariance {
-                    Some(c) if mean_square < MOST_HIDDEN && coloured_like_noise(&c) => mean_square.max(1.0),
+                    Some(c) if mean_square < MOST_HIDDEN && coloured_like_noise(&c) => {
+                        (mean_square * (1.0 - remembered(&c))).max(1.0)
+                    }
                     _ => 1.0,
                 },
             }
@@ -109,6 +116,17 @@ fn coloured_like_noise(covariance: &[f64]) -> bool {
     }
     let rho = |lag: usize| covariance[lag] / covariance[0];
     rho(NEAR_LAG) > WHITE && rho(FAR_LAG) < rho(NEAR_LAG) * (1.0 - FORGETS).powi((FAR_LAG - NEAR_LAG) as i32)
+}
+
+/// Noise of any colour has forgotten itself after so many rows, ...
+const LONG_LAG: usize = 60;
+/// ... but for this part, which may be chance.
+const BY_CHANCE: f64 = 0.15;
+
+/// The part of residuals that is remembered for longer than noise remembers anything: a slow misfit beside noise.
+fn remembered(covariance: &[f64]) -> f64 {
+    let long = covariance.get(LONG_LAG).filter(|_| covariance.len() > 4 * LONG_LAG);
+    long.map(|c| c / covariance[0]).filter(|part| *part > BY_CHANCE).unwrap_or(0.0)
 }
 
 /// Mean over [`LAGS`] lags of `N rho^2`: about 1 where nothing is left but white noise (Box & Pierce, JASA 65 (1970)).
@@ -190,6 +208,11 @@ mod tests {
         }
         let slow: Vec<f64> = white.iter().enumerate().map(|(i, n)| n + 2.0 * (i as f64 * 0.03).sin()).collect();
         assert_eq!(level(&slow), 1.0);
+        // Beside coloured noise it is told from it.
+        let coloured = autoregressive(0.8, 5_000);
+        let both: Vec<f64> = coloured.iter().enumerate().map(|(i, n)| n + 2.0 * (i as f64 * 0.003).sin()).collect();
+        let found = level(&both) * (1.0 - 0.8 * 0.8);
+        assert!((found - 1.0).abs() < 0.3, "{found}");
     }
 
     #[test]

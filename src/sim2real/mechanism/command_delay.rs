@@ -8,6 +8,9 @@ use crate::sim2real::{
 
 /// `u(t) -> u(t - seconds)`; an order arrives `seconds` after it was sent.
 ///
+/// Of a signal the recording does not tell what was in force before its first command: with `seconds` the same as then, as where a
+/// recording is cut out of what went on; with `dead_time` nothing, as where a driver is switched on with the recording.
+///
 /// Source: dead time in a loop, Åström & Murray, *Feedback Systems* (2nd ed. 2021), section 9.2; order latency as
 /// simulated time, Moallemi & Sağlam, "The cost of latency", Operations Research 61 (2013).
 #[derive(Debug, Clone, Copy)]
@@ -16,9 +19,13 @@ pub struct CommandDelay {
     pub longest: f64,
     /// Where fits begin [s].
     pub starts: &'static [f64],
-    /// Whether the output is differentiable in the delay.
-    pub smooth: bool,
+    /// Whether commands are signals, which hold until the next: then the output is differentiable in the delay, and something
+    /// may have been in force before the first.
+    pub holds: bool,
 }
+
+/// The form by which nothing was in force before the first command.
+const FROM_REST: &str = "from_rest";
 
 impl<P: Plant> Mechanism<P> for CommandDelay {
     fn about(&self) -> About {
@@ -26,7 +33,7 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
             name: "command_delay",
             site: Site::Command,
             title: "a delay of the command",
-            law: "u(t) -> u(t - seconds)",
+            law: "u(t) -> u(t - seconds); from_rest: 0 before the first command has arrived, after dead_time",
             source: "Åström & Murray, Feedback Systems (2021), 9.2; Moallemi & Sağlam, Operations Research 61 (2013)",
             remedy: "stamp commands when sent and when they take effect; add the delay to the simulator",
             contains: &[],
@@ -36,15 +43,23 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let shown = typical.delay.filter(|delay| *delay > 0.0 && *delay <= self.longest);
         let starts: Vec<f64> = shown.into_iter().chain(self.starts.iter().copied()).collect();
-        let mut seconds = Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(&starts);
-        seconds.smooth = self.smooth;
-        seconds.shown = typical.delays.filter(|[delay, _]| *delay > 0.0 && *delay <= self.longest);
-        Form::only(vec![seconds])
+        let delay = |name| {
+            let mut delay = Parameter::new(name, "s", 0.0).within(0.0, self.longest).starting_at(&starts);
+            delay.smooth = self.holds;
+            delay.shown = typical.delays.filter(|[delay, _]| *delay > 0.0 && *delay <= self.longest);
+            delay
+        };
+        let mut forms = Form::only(vec![delay("seconds")]);
+        if self.holds {
+            forms.push(Form { name: FROM_REST, parameters: vec![delay("dead_time")] });
+        }
+        forms
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let seconds = thetas.row(0).to_vec();
-        Box::new(Delay::<P> { lines: vec![Default::default(); seconds.len()], seconds })
+        let line = if form == 0 { <P::Command as Command>::Line::default() } else { DelayLine::at_rest() };
+        Box::new(Delay::<P> { lines: vec![line.clone(); seconds.len()], fresh: line, seconds })
     }
 }
 
@@ -52,12 +67,14 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
 struct Delay<P: Plant> {
     seconds: Vec<f64>,
     lines: Vec<<P::Command as Command>::Line>,
+    /// What each line begins as.
+    fresh: <P::Command as Command>::Line,
 }
 
 impl<P: Plant> Law<P> for Delay<P> {
     fn change(&mut self, change: &LaneChange<'_>) {
         change.parameter(0, &mut self.seconds);
-        change.memory(&mut self.lines);
+        change.memory_from(&mut self.lines, &self.fresh);
     }
 
     fn shape_each(&mut self, ticks: Ticks<'_>, commands: &mut [P::Command]) {
@@ -83,6 +100,12 @@ pub struct HeldLine {
 }
 
 impl HeldLine {
+    /// A line on which the signal was 0 before its first value.
+    #[must_use]
+    pub fn at_zero() -> Self {
+        Self { past: VecDeque::from([(f64::NEG_INFINITY, 0.0)]) }
+    }
+
     /// Mean over `[start, start + step)` of the signal `seconds` [s] ago, after `value` has been held from `start` on.
     pub fn mean(&mut self, tick: Tick, seconds: f64, value: f64) -> f64 {
         // Before its first change a signal is taken to have held the value it has at first.
@@ -124,11 +147,21 @@ mod tests {
     }
 
     #[test]
+    fn before_the_first_command_arrives_there_is_nothing_or_the_same() {
+        let arriving = |mut line: HeldLine| -> Vec<f64> {
+            (0..6).map(|i| line.mean(tick(i, 1.0), 1.75, if i < 3 { 4.0 } else { 8.0 })).collect()
+        };
+        assert_eq!(arriving(HeldLine::default()), [4.0, 4.0, 4.0, 4.0, 5.0, 8.0]);
+        assert_eq!(arriving(HeldLine::at_zero()), [0.0, 1.0, 4.0, 4.0, 5.0, 8.0]);
+    }
+
+    #[test]
     fn no_delay_changes_no_bit() {
-        let mut line = HeldLine::default();
-        for i in 0..100 {
-            let value = (i as f64 * 0.7).sin();
-            assert_eq!(line.mean(tick(i, 0.001), 0.0, value), value);
+        for mut line in [HeldLine::default(), HeldLine::at_zero()] {
+            for i in 0..100 {
+                let value = (i as f64 * 0.7).cos();
+                assert_eq!(line.mean(tick(i, 0.001), 0.0, value), value);
+            }
         }
     }
 

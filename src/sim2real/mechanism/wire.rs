@@ -28,6 +28,10 @@ impl DelayLine<Level> for HeldLine {
     fn pass(&mut self, tick: Tick, seconds: f64, command: &mut Level) {
         command.0 = self.mean(tick, seconds, command.0);
     }
+
+    fn at_rest() -> Self {
+        Self::at_zero()
+    }
 }
 
 impl Observation for [f64; 2] {
