@@ -89,7 +89,7 @@ fn nothing_is_named_where_only_parameters_are_off() {
 /// itself, and a complete diagnosis would be called unexplained.
 #[test]
 fn noise_that_remembers_itself_is_not_foretold_by_the_motion() {
-    for (seed, remembers) in [(120, 0.9), (122, 0.75)] {
+    for (seed, remembers) in [(120, 0.9_f64), (122, 0.75)] {
         let mut rng = Seed(seed).stream("coloured");
         let mut recorded = |excitation, seed| {
             let mut recording = recording(&[ServoEffect::TYPICAL[0]], excitation, seed, 5_000);

@@ -38,6 +38,8 @@ const SWAPS: usize = 4;
 const ANYBODYS: f64 = 0.5;
 /// ... where what is left without it has at most this many times the mean square of the noise.
 const HARDLY_LEFT: f64 = 2.0;
+/// One of several that is less likely than this beside its rivals is worth no name at all.
+const HARDLY_IT: f64 = 0.05;
 
 /// Puts rivals that do better in the place of what was selected, until none does; leaves out what might as well be
 /// anything; then lists the rivals that remain.
@@ -50,13 +52,15 @@ pub(super) fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, selection: Selection<T>
     (selection, places)
 }
 
-/// The mechanism, one of several, that explains a small share only and is hardly more likely than its rivals.
+/// The mechanism, one of several, that explains a small share only and is hardly more likely than its rivals, or that others beat of
+/// which none is needed in its place.
 fn anybodys<T: Twin>(selection: &Selection<T>, places: &[Place]) -> Option<usize> {
     let whole = &selection.selected;
     (0..places.len()).filter(|_| places.len() > 1).find(|place| {
         let less = &selection.without[*place];
         let little = share(&selection.recalibrated, less, whole) < SHARE && less.within(HARDLY_LEFT);
-        little && by_evidence(&places[*place]).0 < ANYBODYS
+        let likely = by_evidence(&places[*place]).0;
+        little && likely < ANYBODYS || likely < HARDLY_IT
     })
 }
 
