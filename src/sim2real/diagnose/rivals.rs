@@ -98,14 +98,16 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
                 let one = |s: &&Screened| {
                     let rival = pursued(inquiry, &selection.recalibrated, selected, less, s);
                     let abouts = (inquiry.candidates[*own].about, inquiry.candidates[s.number].about);
-                    (s.number, loss(inquiry, &selection.recalibrated, selected, &rival, abouts))
+                    let loss = loss(inquiry, &selection.recalibrated, selected, &rival, abouts);
+                    // What runs away cannot be compared: it is no rival.
+                    (s.number, if loss.is_nan() { f64::INFINITY } else { loss })
                 };
                 tried.par_iter().map(one).collect()
             };
             let mut others = losses(likely(inquiry, selection, &screened));
             others.extend(losses(further_forms(inquiry, &screened, &others)));
             best_forms(inquiry, &mut others);
-            let nearest = others.iter().map(|(_, loss)| *loss).min_by(f64::total_cmp);
+            let nearest = others.iter().map(|(_, loss)| *loss).filter(|loss| loss.is_finite()).min_by(f64::total_cmp);
             Place { gain: whole, nearest, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
         })
         .collect()
