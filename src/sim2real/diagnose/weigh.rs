@@ -235,3 +235,50 @@ pub(super) fn pursued<T: Twin>(
     let briefly = inquiry.instead(best, less, one, Effort::Brief);
     if lead(inquiry, first, best, &briefly) < HOPELESS { inquiry.refitted(&briefly) } else { briefly }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::sim2real::identify::{Fit, State};
+
+    /// What leaves a mean square of 6,000 residuals, as many of which are effective as that.
+    fn leaving(mean_square: f64, effective: f64) -> Hypothesis<()> {
+        let count = 6_000;
+        let misfit = ChannelMisfit {
+            channel: "position".into(),
+            sum_of_squares: mean_square * count as f64,
+            count,
+            autocorrelation_time: count as f64 / effective,
+            level: 1.0,
+        };
+        let fit = Fit {
+            values: Vec::new(),
+            std: Vec::new(),
+            covariance: None,
+            free: Vec::new(),
+            state: State { initial: Vec::new(), values: Vec::new(), misfit: 1.0 },
+            residual: DVector::zeros(0),
+            jacobian: DMatrix::zeros(0, 0),
+            rank: 0,
+            prior: 0.0,
+            at_bound: Vec::new(),
+        };
+        Hypothesis { twin: (), added: Vec::new(), fit, misfits: vec![misfit] }
+    }
+
+    #[test]
+    fn what_leaves_more_is_weighed_as_what_leaves_least_unless_it_is_less_white() {
+        let best = leaving(5.0, 87.0);
+        let by_the_best = |other: &Hypothesis<()>| std::ptr::eq(scale_of(other, &best), &raw const best);
+        assert!(by_the_best(&leaving(7.3, 111.0)) && by_the_best(&leaving(13.5, 400.0)), "whiter");
+        assert!(by_the_best(&leaving(7.3, 70.0)), "as white, for so few are known to two fifths");
+        assert!(!by_the_best(&leaving(7.3, 30.0)), "less white");
+        assert!(by_the_best(&leaving(5.1, 30.0)), "no more than is left of the best");
+        let white = leaving(1.0, 5_000.0);
+        assert!(std::ptr::eq(scale_of(&leaving(1.2, 4_500.0), &white), &raw const white));
+        let less_white = leaving(1.2, 3_500.0);
+        assert!(std::ptr::eq(scale_of(&less_white, &white), &raw const less_white), "of many the number is known well");
+    }
+}
