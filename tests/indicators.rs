@@ -148,7 +148,14 @@ proptest! {
         // Averages that begin otherwise agree to 1e-9 when (1 - 1/n)^k of the difference is left: 25 n rows.
         let range = core.adx(0, end, &high, &low, &close, n as i32, &mut a).unwrap();
         let adx = ours(Adx::new(period(n)), bars.clone());
-        agree("adx", &adx.iter().map(|d| d.map(|d| d.index)).collect::<Vec<_>>(), &rows(&a, range), 25 * n, 100.0)?;
+        // Where no bar has a direction at first, TA-Lib's index is 0; here there is none until one has.
+        let directed = |w: &[Bar]| {
+            let (rise, fall) = (w[1].high.to_f64() - w[0].high.to_f64(), w[0].low.to_f64() - w[1].low.to_f64());
+            rise != fall && rise.max(fall) > 0.0
+        };
+        if bars[..=n].windows(2).any(directed) {
+            agree("adx", &adx.iter().map(|d| d.map(|d| d.index)).collect::<Vec<_>>(), &rows(&a, range), 25 * n, 100.0)?;
+        }
         for up in [true, false] {
             let range = if up {
                 core.plus_di(0, end, &high, &low, &close, n as i32, &mut a).unwrap()
