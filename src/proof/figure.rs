@@ -148,11 +148,20 @@ impl Figure {
         match (self.value, self.interval) {
             (None, _) if self.of > 0 => "not found".to_owned(),
             (None, _) => "no cases".to_owned(),
-            (Some(value), None) => self.unit.shown(value),
+            (Some(value), None) => self.told(value),
             (Some(value), Some([low, high])) => {
-                format!("{} ({} to {})", self.unit.shown(value), self.unit.bare(low), self.unit.bare(high))
+                format!("{} ({} to {})", self.told(value), self.unit.bare(low), self.unit.bare(high))
             }
         }
+    }
+
+    /// A value with as many digits as it takes to see how it stands: 92.9 % is not the 93 % that were wanted.
+    fn told(&self, value: f64) -> String {
+        let usual = self.unit.digits(value);
+        let tells = |digits: &usize| {
+            self.goal.is_none_or(|goal| goal.standing(self.unit.rounded(value, *digits)) == goal.standing(value))
+        };
+        self.unit.with_unit(value, (usual..usual + MORE_DIGITS).find(tells).unwrap_or(usual))
     }
 
     /// What was wanted as text: the least and the aim.
@@ -179,23 +188,49 @@ impl Figure {
     }
 }
 
+/// A value is shown with fewer more digits than this.
+const MORE_DIGITS: usize = 4;
+
 impl Unit {
     fn shown(self, value: f64) -> String {
-        match self {
-            Self::Share => format!("{}\u{a0}%", self.bare(value)),
-            Self::Seconds => format!("{}\u{a0}s", self.bare(value)),
-            Self::Number => self.bare(value),
-        }
+        self.with_unit(value, self.digits(value))
     }
 
     fn bare(self, value: f64) -> String {
+        self.with_digits(value, self.digits(value))
+    }
+
+    fn with_unit(self, value: f64, digits: usize) -> String {
+        let bare = self.with_digits(value, digits);
         match self {
-            Self::Share if value > 0.0 && value < 0.1 => format!("{:.1}", 100.0 * value),
-            Self::Share => format!("{:.0}", 100.0 * value),
-            Self::Seconds if value < 10.0 => format!("{value:.2}"),
-            Self::Seconds => format!("{value:.0}"),
-            Self::Number if value < 100.0 => format!("{value:.3}"),
-            Self::Number => format!("{value:.0}"),
+            Self::Share => format!("{bare}\u{a0}%"),
+            Self::Seconds => format!("{bare}\u{a0}s"),
+            Self::Number => bare,
+        }
+    }
+
+    fn with_digits(self, value: f64, digits: usize) -> String {
+        format!("{:.digits$}", value * self.per_one())
+    }
+
+    /// What `with_digits` shows of a value.
+    fn rounded(self, value: f64, digits: usize) -> f64 {
+        self.with_digits(value, digits).parse::<f64>().map_or(value, |shown| shown / self.per_one())
+    }
+
+    /// Digits behind the point that are usual for a value.
+    fn digits(self, value: f64) -> usize {
+        match self {
+            Self::Share => usize::from(value > 0.0 && value < 0.1),
+            Self::Seconds => 2 * usize::from(value < 10.0),
+            Self::Number => 3 * usize::from(value < 100.0),
+        }
+    }
+
+    fn per_one(self) -> f64 {
+        match self {
+            Self::Share => 100.0,
+            Self::Seconds | Self::Number => 1.0,
         }
     }
 }
@@ -223,5 +258,18 @@ mod tests {
         assert_eq!((figure.value, figure.standing, figure.shown().as_str()), (None, Standing::Missed, "not found"));
         assert_eq!(Figure::share("x", []).wanting(Goal::new(0.5, 0.9)).standing, Standing::Open);
         assert_eq!(Figure::share("x", [true, true, false, true]).shown(), "75\u{a0}% (30 to 95)");
+    }
+
+    #[test]
+    fn a_value_is_told_from_what_was_wanted() {
+        let of = |hits: usize, least: f64| {
+            let holds = (0..70).map(|k| k < hits);
+            Figure::share("x", holds).wanting(Goal::new(least, 0.99)).shown()
+        };
+        assert_eq!(of(65, 0.93), "92.9\u{a0}% (84 to 97)");
+        assert_eq!(of(65, 0.92), "93\u{a0}% (84 to 97)");
+        assert_eq!(of(60, 0.93), "86\u{a0}% (76 to 92)");
+        let goal = Goal::new(0.1, 0.03);
+        assert_eq!(Figure::number("ece", Some(0.10004), 1).wanting(goal).shown(), "0.10004");
     }
 }
