@@ -6,6 +6,9 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 /// `time_constant du/dt = u_command - u`; in the form `two_stage`, two such lags of half of `total_time` each, one after the
 /// other: a filter, then a winding; in the form `two_poles` the two have each a time constant of its own.
 ///
+/// A recording does not tell what was in force before its first command: by these the same, as where it is cut out of what went
+/// on; in the forms `from_rest` (one lag, of `lag_time`) and `two_poles_from_rest` nothing, as where a driver is switched on with it.
+///
 /// Solved exactly over a tick for a command that holds; what the plant gets is the mean over the tick.
 ///
 /// Source: first-order actuator, Åström & Murray, *Feedback Systems* (2nd ed. 2021), section 3.3.
@@ -21,7 +24,7 @@ where
             name: "actuator_lag",
             site: Site::Command,
             title: "a lag of the actuator",
-            law: "time_constant du/dt = u_command - u; two_stage: twice, with half of total_time each; two_poles: twice",
+            law: "time_constant du/dt = u_command - u; two_stage: twice, with half of total_time each; two_poles: twice; from_rest: from u = 0",
             source: "Åström & Murray, Feedback Systems (2021), 3.3",
             remedy: "measure the actuator's step response; add the lag to the simulator",
             contains: &[],
@@ -30,20 +33,24 @@ where
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
         let time = |name| Parameter::new(name, "s", 0.0).within(0.0, 2.0).starting_at(&[0.01, 0.05]);
-        let shorter = Parameter::new("fast_time_constant", "s", 0.0).within(0.0, 2.0).starting_at(&[0.005]);
+        let shorter = |name| Parameter::new(name, "s", 0.0).within(0.0, 2.0).starting_at(&[0.005]);
         vec![
             Form { name: "first_order", parameters: vec![time("time_constant")] },
             Form { name: "two_stage", parameters: vec![time("total_time")] },
-            Form { name: "two_poles", parameters: vec![time("slow_time_constant"), shorter] },
+            Form { name: "two_poles", parameters: vec![time("slow_time_constant"), shorter("fast_time_constant")] },
+            Form { name: "from_rest", parameters: vec![time("lag_time")] },
+            Form { name: "two_poles_from_rest", parameters: vec![time("slow_lag_time"), shorter("fast_lag_time")] },
         ]
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let lag = |time_constant| Lag { time_constant, follower: vec![None; thetas.lanes()], decay: Decay::default() };
+        let before = if form < FROM_REST { None } else { Some(0.0) };
+        let lag =
+            |time_constant| Lag { time_constant, before, follower: vec![before; thetas.lanes()], decay: Decay::default() };
         let half = || thetas.row(0).iter().map(|time| 0.5 * time).collect();
         match form {
-            0 => Box::new(lag(thetas.row(0).to_vec())),
             1 => Box::new(Stages { first: lag(half()), second: lag(half()), alike: true }),
+            0 | FROM_REST => Box::new(lag(thetas.row(0).to_vec())),
             _ => {
                 let [first, second] = [0, 1].map(|k| lag(thetas.row(k).to_vec()));
                 Box::new(Stages { first, second, alike: false })
@@ -52,10 +59,15 @@ where
     }
 }
 
+/// The forms from this one on have an actuator that gave nothing before its first command.
+const FROM_REST: usize = 3;
+
 #[derive(Clone)]
 struct Lag {
     time_constant: Vec<f64>,
-    /// What it gives at the start of the tick; none before the first command, which it has already reached.
+    /// What it gave before the first command; none where it had already reached that.
+    before: Option<f64>,
+    /// What it gives at the start of the tick.
     follower: Vec<Option<f64>>,
     decay: Decay,
 }
@@ -87,7 +99,7 @@ impl Lag {
     /// Changes a lane, whose time constant follows from its parameters by `of`.
     fn change_by(&mut self, change: &LaneChange<'_>, of: impl Fn(&[f64]) -> f64) {
         change.derived(&mut self.time_constant, of);
-        change.memory(&mut self.follower);
+        change.memory_from(&mut self.follower, &self.before);
         self.decay.change(change, &self.time_constant);
     }
 }
@@ -175,5 +187,18 @@ mod tests {
         assert_eq!(half, shaped(&ActuatorLag, 2, &[&[b, b]], step, &commands));
         let one = &shaped(&ActuatorLag, 0, &[&[a]], step, &commands)[0];
         assert!(out[2].iter().zip(one).all(|(two, one)| (two - one).abs() < 1e-12));
+    }
+
+    /// From rest the first command is answered as a step from nothing; where it was in force before, by itself.
+    #[test]
+    fn what_begins_at_rest_follows_its_first_command() {
+        let (a, b, step) = (0.05, 0.02, 0.01);
+        let stepped: Vec<f64> = (0..101).map(|k| if k == 0 { 0.0 } else { 1.0 }).collect();
+        for (form, before, thetas) in [(3, 0, &[a][..]), (4, 2, &[a, b])] {
+            let out = &shaped(&ActuatorLag, form, &[thetas], step, &stepped[1..])[0];
+            let after_a_zero = &shaped(&ActuatorLag, before, &[thetas], step, &stepped)[0][1..];
+            assert!(out.iter().zip(after_a_zero).all(|(own, other)| (own - other).abs() < 1e-12), "form {form}");
+            assert_eq!(shaped(&ActuatorLag, before, &[thetas], step, &stepped[1..])[0], stepped[1..]);
+        }
     }
 }

@@ -7,6 +7,9 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 /// The ramp is solved exactly; what arrives in a tick is its mean over the tick, which is differentiable in the rate
 /// although ticks and the moments at which the command is reached do not fall together.
 ///
+/// A recording does not tell what was in force before its first command: with `rate` that command, as where it is cut out of what
+/// went on; in the form `from_rest`, with `slew_rate`, nothing, as where a driver is switched on with it.
+///
 /// Source: Klyde, McRuer & Myers, "Pilot-induced oscillation analysis and prediction with actuator rate limiting", Journal
 /// of Guidance, Control, and Dynamics 20 (1997).
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +24,7 @@ where
             name: "rate_limit",
             site: Site::Command,
             title: "a limit to how fast the actuator's output changes",
-            law: "|du/dt| <= rate",
+            law: "|du/dt| <= rate; from_rest: from u = 0",
             source: "Klyde, McRuer & Myers, Journal of Guidance, Control, and Dynamics 20 (1997)",
             remedy: "look for a ramp set in the drive; command no faster changes, or limit their rate in the simulator too",
             contains: &[],
@@ -31,8 +34,12 @@ where
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         // From a typical command in a fiftieth of a second to one in a second.
         let starts = [50.0, 15.0, 4.0, 1.0].map(|per_second| per_second * typical.command);
-        let rate = Parameter::new("rate", "command/s", f64::INFINITY).within(0.0, f64::INFINITY);
-        Form::only(vec![rate.starting_at(&starts)])
+        let rate = |name| {
+            let rate = Parameter::new(name, "command/s", f64::INFINITY).within(0.0, f64::INFINITY);
+            vec![rate.starting_at(&starts)]
+        };
+        let from_rest = Form { name: "from_rest", parameters: rate("slew_rate") };
+        Form::only(rate("rate")).into_iter().chain([from_rest]).collect()
     }
 
     /// Long enough for a ramp of some steepness to reach its command, after which all that was before is forgotten.
@@ -40,15 +47,18 @@ where
         4.0
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Ramp { rate: thetas.row(0).to_vec(), output: vec![None; thetas.lanes()] })
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let before = if form == 0 { None } else { Some(0.0) };
+        Box::new(Ramp { rate: thetas.row(0).to_vec(), before, output: vec![before; thetas.lanes()] })
     }
 }
 
 #[derive(Clone)]
 struct Ramp {
     rate: Vec<f64>,
-    /// What the actuator gives at the start of the tick; none before the first command, which it has already reached.
+    /// What the actuator gave before the first command; none where it had already reached that.
+    before: Option<f64>,
+    /// What it gives at the start of the tick.
     output: Vec<Option<f64>>,
 }
 
@@ -58,7 +68,7 @@ where
 {
     fn change(&mut self, change: &LaneChange<'_>) {
         change.parameter(0, &mut self.rate);
-        change.memory(&mut self.output);
+        change.memory_from(&mut self.output, &self.before);
     }
 
     fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
@@ -101,6 +111,13 @@ mod tests {
         assert_eq!(out[1], vec![0.0; 20]);
         assert_eq!(out[2], commands);
         assert!(out[3].iter().zip(&commands).all(|(got, command)| (got - command).abs() < 1e-7));
+    }
+
+    #[test]
+    fn what_begins_at_rest_climbs_to_its_first_command() {
+        let out = shaped(&RateLimit, 1, &[&[2.0], &[f64::INFINITY]], 0.25, &[1.0; 4]);
+        assert_eq!(out, [[0.25, 0.75, 1.0, 1.0], [1.0; 4]]);
+        assert_eq!(shaped(&RateLimit, 0, &[&[2.0]], 0.25, &[1.0; 4]), [[1.0; 4]]);
     }
 
     #[test]
