@@ -15,6 +15,9 @@ const CERTAIN_BY_SIGHT: f64 = 0.99;
 /// noise, as those of prices that are rounded to ticks may be, it is in their own size.
 const DISTINCT: f64 = 5.0;
 
+/// A parameter further than this from where it does nothing, in its scale, does something.
+const AWAY: f64 = 1e-2;
+
 /// What was selected, the surest first.
 pub(super) fn fitted<T: Twin>(
     inquiry: &Inquiry<'_, T>,
@@ -81,7 +84,8 @@ pub(super) fn fitted<T: Twin>(
 fn at_edge(parameters: &[Parameter], from: usize, findings: &Findings) -> usize {
     let of = |k: &usize| parameters.get(k.checked_sub(from)?).map(|p| (p, findings.trued.values[*k]));
     let nailed = findings.trued.at_bound.iter().filter_map(of);
-    nailed.filter(|(p, value)| (value - p.nominal).abs() > 1e-2 * p.scale() && value.abs() > 1e-2 * p.scale()).count()
+    let away = |value: f64, from: f64, p: &Parameter| (value - from).abs() > AWAY * p.scale();
+    nailed.filter(|(p, value)| away(*value, p.nominal, p) && away(*value, 0.0, p)).count()
 }
 
 /// What a sign in the recordings shows without a fit.
