@@ -49,6 +49,12 @@ impl<T> Hypothesis<T> {
         self.misfits.iter().all(nothing)
     }
 
+    /// Whether it leaves more than noise, of whatever colour. Where a first mechanism alone gains nothing, two may: what the second
+    /// would take away hides how much the first explains, if it is slow.
+    pub(super) fn leaves_something(&self) -> bool {
+        !self.leaves_nothing() && !self.misfits.iter().all(ChannelMisfit::like_noise)
+    }
+
     /// Whether the mean square of what is left is at most `times` that of the noise, whatever its colour.
     pub(super) fn within(&self, times: f64) -> bool {
         self.misfits.iter().all(|m| m.within(times, m.level))

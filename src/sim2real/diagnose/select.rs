@@ -19,8 +19,7 @@ const UNBENT: f64 = 1.05;
 const NEARLY_ALL: f64 = 9.0;
 /// Most mechanisms in a set.
 const STAGES: usize = 4;
-/// Where a first mechanism alone gains nothing, two may: they are tried while the mean squared residual is this many
-/// times the noise.
+/// What is selected is complete if it leaves a mean squared residual of at most this many times the noise.
 const ABOVE_NOISE: f64 = 1.5;
 /// Of so many hypotheses that come near the best on windows, the one that does best in free run is taken.
 const NEAR_BEST: usize = 8;
@@ -95,8 +94,7 @@ fn selected_from<T: Twin>(
         if strays(inquiry, parent, &best) {
             break;
         }
-        let left = !best.within(ABOVE_NOISE);
-        let promising = gain(inquiry, parent, &best) > ACCEPT || left && stage == 0;
+        let promising = gain(inquiry, parent, &best) > ACCEPT || stage == 0 && best.leaves_something();
         best_of_stage.push(best);
         if !promising {
             break;
