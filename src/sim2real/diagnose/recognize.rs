@@ -13,8 +13,10 @@ use crate::sim2real::{Candidate, Clock, Measured, Recording, Signs, Simulator, T
 
 /// Rounding the simulated signal must leave at most this part of the squared residual.
 const LEFT: f64 = 0.7;
-/// Fewer repeated samples than this are chance.
+/// Fewer repeated samples than this are chance, ...
 const FEWEST: usize = 5;
+/// ... and so are fewer runs of them: what hardly moves may once repeat itself for as long as anything.
+const FEWEST_RUNS: usize = 3;
 
 /// Adds to a selection what only rounds: as it is, and with nothing fitted anew, for what jumps has no gradient to follow.
 pub(super) fn finished<T: Twin>(
@@ -57,7 +59,7 @@ pub(super) fn signs<T: Simulator>(twin: &T, recordings: &[Recording<T::Stimulus>
     }
     let counted = Signs { step: if step.is_finite() { step } else { 0.0 }, ..Signs::default() };
     // A signal that hardly ever changes has nothing to lose.
-    if repeated < FEWEST || 2 * repeated > samples {
+    if repeated < FEWEST || runs < FEWEST_RUNS || 2 * repeated > samples {
         return counted;
     }
     Signs { repeated: repeated as f64 / samples as f64, run: repeated as f64 / runs.max(1) as f64, ..counted }
