@@ -20,6 +20,9 @@ pub struct Compliance;
 /// Twists below this [rad] are none.
 const LEAST_TWIST: f64 = 1e-12;
 
+/// The most damping, of the critical, of a shaft, a belt or a gear that counts as elastic: that of metal and rubber is a fraction of this.
+const SWINGS: f64 = 0.5;
+
 impl<P: Mover> Mechanism<P> for Compliance {
     fn about(&self) -> About {
         About {
@@ -53,6 +56,15 @@ impl<P: Mover> Mechanism<P> for Compliance {
             Form { name: "on_motor_hardening", parameters: parameters("link_share", true) },
             Form { name: "on_link_hardening", parameters: parameters("motor_share", true) },
         ]
+    }
+
+    /// A transmission that gives swings, as metal and belts do; what creeps back is not elastic.
+    fn sought(&self, typical: &Typical) -> Vec<Form> {
+        let mut forms = Mechanism::<P>::forms(self, typical);
+        for ratio in forms.iter_mut().flat_map(|form| &mut form.parameters).filter(|p| p.name == "damping_ratio") {
+            ratio.upper = SWINGS;
+        }
+        forms
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

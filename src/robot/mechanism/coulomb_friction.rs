@@ -23,6 +23,8 @@ pub struct CoulombFriction;
 const LEAST_ANGLE: f64 = 1e-12;
 /// The part of the usual motion over which dry friction gives at the most before it slips.
 pub(super) const PRESLIDING: f64 = 0.05;
+/// The part of the usual velocity over which it is turned round at the most.
+const CORNER: f64 = 0.1;
 
 impl<P: Mover> Mechanism<P> for CoulombFriction {
     fn about(&self) -> About {
@@ -56,12 +58,21 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
         ]
     }
 
-    /// A friction that gives over more than a small part of the motion goes by another name.
+    /// A friction that gives over more than a small part of the motion, or that grows with velocity over more than a small part of what
+    /// is usual, goes by another name.
     fn sought(&self, typical: &Typical) -> Vec<Form> {
         let mut forms = Mechanism::<P>::forms(self, typical);
         for parameter in forms.iter_mut().flat_map(|form| &mut form.parameters) {
-            if parameter.name == "presliding_angle" {
-                (parameter.lower, parameter.upper) = (1e-4 * typical.output.min(1.0), PRESLIDING * typical.output);
+            match parameter.name.as_ref() {
+                "presliding_angle" => {
+                    (parameter.lower, parameter.upper) = (1e-4 * typical.output.min(1.0), PRESLIDING * typical.output);
+                }
+                "velocity" => {
+                    parameter.upper = (CORNER * typical.rate).max(parameter.lower);
+                    parameter.nominal = (0.2 * parameter.upper).max(parameter.lower);
+                    parameter.starts = vec![parameter.nominal];
+                }
+                _ => {}
             }
         }
         forms

@@ -50,6 +50,16 @@ where
         vec![form("linear", "strength"), form("reciprocal", "reciprocal_strength")]
     }
 
+    /// What weakens within a part of a second and recovers as soon is not warm: windings of the smallest motors take seconds.
+    fn sought(&self, typical: &Typical) -> Vec<Form> {
+        let mut forms = Mechanism::<P>::forms(self, typical);
+        for time in forms.iter_mut().flat_map(|form| &mut form.parameters).filter(|p| p.name == "time_constant") {
+            time.lower = SHORTEST;
+            time.starts.iter_mut().for_each(|start| *start = start.max(SHORTEST));
+        }
+        forms
+    }
+
     /// An actuator that has warmed stays warm: a run from anywhere needs all commands before.
     fn memory(&self) -> f64 {
         f64::INFINITY
@@ -65,6 +75,9 @@ where
         if form == 0 { Box::new(Magnets(heat)) } else { Box::new(Copper(heat)) }
     }
 }
+
+/// The shortest time constant of a winding that is sought [s].
+const SHORTEST: f64 = 0.5;
 
 #[derive(Clone)]
 struct Heat {
