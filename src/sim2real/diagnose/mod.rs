@@ -256,6 +256,7 @@ fn followed(
         fits: prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed),
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
         remainder: remainder::remainder(&inquiry, &selection),
+        followed: remainder::followed(&trued, &selection.selected),
         dependence: remainder::dependence(&inquiry, &selection.selected),
         foretold: remainder::foretold(&inquiry, &selection.selected),
         std: uncertainty::inflated(&inquiry, &selection.selected, &trued),

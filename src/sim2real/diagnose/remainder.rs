@@ -8,11 +8,14 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
 use super::whiteness;
-use crate::sim2real::identify::{Block, Problem, State};
+use crate::sim2real::identify::{Block, Fit, Problem, State};
 use crate::sim2real::{Clock, Covariate, Measured, Part, Recording, Twin};
 
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
 pub(super) const NEAR_THE_NOISE: f64 = 1.5;
+
+/// A run whose mean squared residual is at most this many times the noise follows what was recorded.
+const FOLLOWED: f64 = 2.0;
 
 /// The part of the recalibrated misfit above the noise that is left: of the channel in which most is left.
 ///
@@ -35,6 +38,12 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
             (misfit > (NEAR_THE_NOISE - 1.0) * last.level * count).then(|| last.above(last.level) / misfit)
         })
         .fold(0.0, f64::max)
+}
+
+/// Whether `fit`, that of `selected` in free run, leaves no more than about the noise.
+pub(super) fn followed<T>(fit: &Fit, selected: &Hypothesis<T>) -> bool {
+    let level = selected.misfits.iter().map(|m| m.level).fold(1.0, f64::max);
+    fit.residual.norm_squared() <= FOLLOWED * level * fit.residual.len() as f64
 }
 
 /// What the remaining residuals of messages depend on most.

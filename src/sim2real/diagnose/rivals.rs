@@ -6,7 +6,7 @@ use super::confidence::by_evidence;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::select::Selection;
-use super::weigh::{SHARE, completes, evidence, gain, lead, pursued, share};
+use super::weigh::{SHARE, completes, evidence, gain, lead, left_open, pursued, share};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
@@ -180,11 +180,13 @@ fn loss<T: Twin>(
     }
     if other.contains.contains(&own.name) && rival.free() > selected.free() {
         let slight = share(first, selected, rival) < SLIGHT && !completes(selected, rival);
+        // Not preferred is not excluded: neither by constants that these data leave open, nor by how little the two differ.
+        let listed = (evidence(inquiry, first, selected, rival) - left_open(inquiry, selected, rival)).max(0.5 * WITHIN);
         return match slight {
-            true => evidence(inquiry, first, selected, rival).max(0.5 * WITHIN),
+            true => listed,
             // Of messages laws have the form they are written in: what comes near may well be the one.
             false if inquiry.twin.clock() == Clock::Event => loss,
-            false => loss + WITHIN,
+            false => listed.min(loss + WITHIN),
         };
     }
     loss

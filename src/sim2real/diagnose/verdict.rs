@@ -48,6 +48,8 @@ pub(super) struct Findings {
     pub fits: Vec<ChannelFit>,
     pub placebo_p: Option<f64>,
     pub remainder: f64,
+    /// Whether the trued twin follows what was fitted in free run too, and not on windows alone.
+    pub followed: bool,
     pub dependence: Option<Dependence>,
     pub foretold: f64,
     pub std: Vec<f64>,
@@ -235,7 +237,9 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
             _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(NEAR_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
             // What is clean where it was fitted and far off elsewhere was not moved enough to be told.
-            false if findings.fits.iter().any(far_off) && selection.selected.within(NEAR_THE_NOISE) => Verdict::NotExcited,
+            false if findings.fits.iter().any(far_off) && findings.followed && selection.selected.within(NEAR_THE_NOISE) => {
+                Verdict::NotExcited
+            }
             false if findings.sampled && findings.fits.iter().any(far_off) => Verdict::Unexplained,
             false => Verdict::NoMismatch,
         };

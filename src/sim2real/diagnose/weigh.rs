@@ -4,7 +4,7 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
 use crate::sim2real::identify::Effort;
-use crate::sim2real::{Clock, Twin};
+use crate::sim2real::{Clock, Parameter, Twin};
 
 /// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
 /// quite the form of the real thing, and what they leave looks like something else ...
@@ -84,23 +84,18 @@ fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypot
     if as_white || squares(one) <= (1.0 + ALIKE_LEFT) * squares(best) { best } else { one }
 }
 
-/// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other.
+/// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other: what the
+/// recordings say, and what the twin says of its own parameters.
 pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
-    let lead = evidence(inquiry, first, a, b);
-    if !alike(inquiry, first, a, b) {
-        return lead;
-    }
-    // What says the same is told apart by its length, or by how far the twin's own parameters have to be from what it says of them.
-    match b.free() as f64 - a.free() as f64 {
-        0.0 => {
-            lead.clamp(-INDIFFERENT, INDIFFERENT) + plausibility(inquiry, &a.fit.values)
-                - plausibility(inquiry, &b.fit.values)
-        }
-        longer => {
-            let best = if squares(a) <= squares(b) { a } else { b };
-            longer * (1.0 + best.misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln()
-        }
-    }
+    let by_own = plausibility(inquiry, &a.fit.values) - plausibility(inquiry, &b.fit.values);
+    let evidence = evidence(inquiry, first, a, b);
+    // What says the same is told apart by its length alone.
+    let said = match b.free() as f64 - a.free() as f64 {
+        _ if !alike(inquiry, first, a, b) => evidence,
+        0.0 => evidence.clamp(-INDIFFERENT, INDIFFERENT),
+        longer => longer * (1.0 + least_left(a, b).misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln(),
+    };
+    said + by_own
 }
 
 /// The same by what they leave alone, also where that is alike.
@@ -110,8 +105,31 @@ pub(super) fn evidence<T: Twin>(
     a: &Hypothesis<T>,
     b: &Hypothesis<T>,
 ) -> f64 {
-    let best = if squares(a) <= squares(b) { a } else { b };
+    let best = least_left(a, b);
     weighed(inquiry, first, a, scale_of(a, best)) - weighed(inquiry, first, b, scale_of(b, best))
+}
+
+/// What counting constants charges too much for those that `more` has beyond `less`: it takes each for known as well as so many rows
+/// could tell, where Laplace's approximation charges twice the logarithm of how much narrower the data make what is possible
+/// (Kass & Raftery, "Bayes factors", Journal of the American Statistical Association 90 (1995)). Constants that data do not tell cost
+/// nothing.
+pub(super) fn left_open<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, more: &Hypothesis<T>) -> f64 {
+    let Some(candidate) = more.added.last().map(|number| &inquiry.candidates[*number]) else { return 0.0 };
+    let own = &candidate.form.parameters;
+    let from = more.fit.std.len().saturating_sub(own.len());
+    let whole = (1.0 + least_left(less, more).misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln();
+    let charged = |(parameter, std): (&Parameter, &f64)| {
+        let possible = parameter.starts.iter().fold(parameter.scale(), |most, start| most.max(start.abs()));
+        if std.is_finite() && *std > 0.0 { (possible / std).powi(2).ln_1p() } else { 0.0 }
+    };
+    let mut saved: Vec<f64> = own.iter().zip(&more.fit.std[from..]).map(|one| (whole - charged(one)).max(0.0)).collect();
+    saved.sort_by(|a, b| b.total_cmp(a));
+    saved.iter().take(more.free().saturating_sub(less.free())).sum()
+}
+
+/// Of two hypotheses the one that leaves less.
+fn least_left<'a, T>(a: &'a Hypothesis<T>, b: &'a Hypothesis<T>) -> &'a Hypothesis<T> {
+    if squares(a) <= squares(b) { a } else { b }
 }
 
 /// Twice the logarithm of how plausible the twin's own parameters are, by a Student's t distribution about what the twin says: what
