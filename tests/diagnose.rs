@@ -129,6 +129,34 @@ fn two_effects_are_both_named() {
     assert_eq!(named, expected, "{:#?}", outcome.diagnosis);
 }
 
+/// What a small offset leaves is one thing that stays as it is, however many rows it lasts: by it alone the large effect beside it
+/// would hardly be worth its constants.
+#[test]
+fn a_first_effect_that_a_slow_one_hides_is_named_with_it() {
+    let pair = [ServoEffect::SoftDriver { limit: 1.3 }, ServoEffect::HangingLoad { torque: 0.02 }];
+    let outcome = diagnosed(&twin(), &pair, 140);
+    let found = names(&outcome);
+    assert!(found.contains(&"saturation".to_owned()) && found.len() == 2, "{:#?}", outcome.diagnosis);
+    // A small load, a small offset of the sensor and its drift are hardly to be told from each other.
+    let other = outcome.diagnosis.effects.iter().find(|e| e.mechanism != "saturation").unwrap();
+    let told = std::iter::once(&other.mechanism).chain(other.rivals.iter().map(|r| &r.mechanism));
+    assert!(told.into_iter().any(|name| name == "constant_load"), "{:#?}", outcome.diagnosis);
+}
+
+/// Friction that breaks away a little later than it slides is Coulomb's to within these data, and is not excluded by them.
+#[test]
+fn a_general_law_is_listed_unless_it_is_excluded() {
+    let told = |breakaway| {
+        let outcome = diagnosed(&twin(), &[ServoEffect::BristleFriction { coulomb: 0.18, breakaway }], 150);
+        let effect = outcome.diagnosis.effects[0].clone();
+        let rivals: Vec<String> = effect.rivals.iter().map(|r| r.mechanism.clone()).collect();
+        (effect.mechanism, rivals)
+    };
+    let (name, rivals) = told(0.22);
+    assert!(name == "stribeck_friction" || rivals.contains(&"stribeck_friction".to_owned()), "{name} {rivals:?}");
+    assert_eq!(told(0.27).0, "stribeck_friction");
+}
+
 /// With its law taken out of the registry, an effect must not be given another's name.
 #[test]
 fn an_effect_outside_the_registry_is_not_explained_away() {

@@ -214,6 +214,9 @@ fn overlap(one: &[Span], other: &[Span]) -> f64 {
     if either > 0.0 { both / either } else { 0.0 }
 }
 
+/// What the arithmetic of a constant that is read off rounds at the most, as a part of it.
+const ROUNDING: f64 = 1e-12;
+
 /// A fitted parameter beside the true one.
 struct Pair {
     fitted: Fitted,
@@ -226,8 +229,10 @@ impl Pair {
         (self.fitted.value - self.truth).abs() / self.scale
     }
 
+    /// What was read off exactly, as a sensor's step is, is right to what arithmetic rounds.
     fn covered(&self) -> bool {
-        self.fitted.std.is_some_and(|std| (self.fitted.value - self.truth).abs() <= Z * std)
+        let rounding = ROUNDING * self.truth.abs();
+        self.fitted.std.is_some_and(|std| (self.fitted.value - self.truth).abs() <= Z * std + rounding)
     }
 }
 
@@ -315,6 +320,14 @@ mod tests {
         assert_eq!(overlap(&[span(1.0, 3.0)], &[span(2.0, 5.0)]), 0.25);
         assert_eq!(overlap(&[span(0.0, 1.0), span(2.0, 3.0)], &[span(0.0, 1.0), span(2.0, 3.0)]), 1.0);
         assert_eq!(overlap(&[span(0.0, 1.0)], &[]), 0.0);
+    }
+
+    #[test]
+    fn what_is_read_off_to_the_last_digit_is_right() {
+        let truth = 0.1 + 0.2;
+        let pair = |value, std| Pair { fitted: Fitted { value, std: Some(std) }, truth, scale: 1.0 };
+        assert!(pair(0.3, 0.0).covered() && !pair(0.3 + 1e-9, 0.0).covered());
+        assert!(pair(0.31, 0.006).covered() && !pair(0.31, 0.005).covered());
     }
 
     #[test]

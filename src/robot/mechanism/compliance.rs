@@ -217,6 +217,7 @@ impl<P: Mover> Law<P> for OnLink {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::Joint;
     use crate::robot::mechanism::trial::Trial;
 
     /// Free of damping and gravity the two masses swing against each other with `sqrt(stiffness / reduced inertia)`, about a
@@ -271,5 +272,13 @@ mod tests {
                 assert!(worst < 2e-6 + 6.0 * compliance, "form {form}, {compliance}: {worst} rad");
             }
         }
+    }
+
+    #[test]
+    fn what_creeps_is_not_sought_as_elastic() {
+        let sought = Mechanism::<Joint>::sought(&Compliance, &Typical::default());
+        let ratios: Vec<&Parameter> =
+            sought.iter().flat_map(|f| &f.parameters).filter(|p| p.name == "damping_ratio").collect();
+        assert!(ratios.len() == 4 && ratios.iter().all(|p| p.upper < 1.0 && p.starts.iter().all(|s| *s < p.upper)));
     }
 }

@@ -209,4 +209,12 @@ mod tests {
             assert!((motion[2_999].velocity - expected).abs() < 1e-6, "form {form}: {}", motion[2_999].velocity);
         }
     }
+
+    #[test]
+    fn what_grows_with_velocity_is_not_sought_as_dry() {
+        let typical = Typical { rate: 3.0, ..Typical::default() };
+        let sought = Mechanism::<Joint>::sought(&CoulombFriction, &typical);
+        let velocity = sought.iter().flat_map(|f| &f.parameters).find(|p| p.name == "velocity").unwrap();
+        assert!(velocity.upper < typical.rate / 5.0 && velocity.starts.iter().all(|s| *s < velocity.upper));
+    }
 }

@@ -58,11 +58,15 @@ pub(super) fn signs<T: Simulator>(twin: &T, recordings: &[Recording<T::Stimulus>
         runs += stale.iter().zip(std::iter::once(&false).chain(&stale)).filter(|(now, before)| **now && !**before).count();
     }
     let counted = Signs { step: if step.is_finite() { step } else { 0.0 }, ..Signs::default() };
-    // A signal that hardly ever changes has nothing to lose.
-    if repeated < FEWEST || runs < FEWEST_RUNS || 2 * repeated > samples {
+    if !lost_some(samples, repeated, runs) {
         return counted;
     }
     Signs { repeated: repeated as f64 / samples as f64, run: repeated as f64 / runs.max(1) as f64, ..counted }
+}
+
+/// Whether so many repeated samples, in so many runs, are more than chance. A signal that hardly ever changes has nothing to lose.
+fn lost_some(samples: usize, repeated: usize, runs: usize) -> bool {
+    repeated >= FEWEST && runs >= FEWEST_RUNS && 2 * repeated <= samples
 }
 
 /// A run of equal samples counts as lost where fewer than this many as long are to be expected by chance ...
@@ -179,5 +183,18 @@ mod tests {
         }
         let lost = stale(&measured(held), resolution).iter().filter(|s| **s).count();
         assert!((300..=360).contains(&lost), "{lost} of 360");
+    }
+
+    #[test]
+    fn to_stand_still_once_is_not_to_lose_samples() {
+        // About where it turns round it hardly moves, and what it counts stays the same for longer than chance elsewhere has it.
+        let counted = |i: usize| (400.0 * (0.004 * i as f64).cos() + 1.5 * (i as f64 * 1.7).sin()).round();
+        let mut turning: Vec<Option<f64>> = (0..3_000).map(|i| Some(counted(i))).collect();
+        turning[784..796].fill(Some(counted(784)));
+        turning[796] = Some(counted(784) - 4.0);
+        let stale = stale(&measured(turning), 1.0 / 12.0_f64.sqrt());
+        let repeated = stale.iter().filter(|s| **s).count();
+        assert!(repeated >= FEWEST, "{repeated}");
+        assert!(!lost_some(stale.len(), repeated, 1) && lost_some(stale.len(), repeated, 4));
     }
 }

@@ -154,7 +154,7 @@ where
 
 #[cfg(test)]
 mod tests {
-    use super::super::wire::shaped;
+    use super::super::wire::{Wire, shaped};
     use super::*;
 
     const STRENGTH: f64 = 0.01;
@@ -198,6 +198,15 @@ mod tests {
             let middle = seconds - 0.5 * step;
             assert!((out[0][count - 1] - (1.0 - STRENGTH * middle)).abs() < 1e-12);
             assert!((out[1][count - 1] - out[0][count - 1]).abs() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn what_recovers_at_once_is_not_sought_as_warm() {
+        for duration in [0.3, 20.0] {
+            let sought = Mechanism::<Wire>::sought(&ThermalDerating, &Typical { duration, ..Typical::default() });
+            let times = sought.iter().flat_map(|f| &f.parameters).filter(|p| p.name == "time_constant");
+            assert!(times.into_iter().all(|p| p.lower >= 0.5 && p.starts.iter().all(|s| *s >= p.lower)));
         }
     }
 }
