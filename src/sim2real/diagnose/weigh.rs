@@ -118,9 +118,10 @@ pub(super) fn left_open<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>,
     let own = &candidate.form.parameters;
     let from = more.fit.std.len().saturating_sub(own.len());
     let whole = (1.0 + least_left(less, more).misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln();
+    // Nothing of what is infinitely unsure, all of what is known exactly.
     let charged = |(parameter, std): (&Parameter, &f64)| {
         let possible = parameter.starts.iter().fold(parameter.scale(), |most, start| most.max(start.abs()));
-        if std.is_finite() && *std > 0.0 { (possible / std).powi(2).ln_1p() } else { 0.0 }
+        (possible / std).powi(2).ln_1p()
     };
     let mut saved: Vec<f64> = own.iter().zip(&more.fit.std[from..]).map(|one| (whole - charged(one)).max(0.0)).collect();
     saved.sort_by(|a, b| b.total_cmp(a));
@@ -298,5 +299,16 @@ mod tests {
         assert!(std::ptr::eq(scale_of(&leaving(1.2, 4_500.0), &white), &raw const white));
         let less_white = leaving(1.2, 3_500.0);
         assert!(std::ptr::eq(scale_of(&less_white, &white), &raw const less_white), "of many the number is known well");
+    }
+
+    #[test]
+    fn one_offset_is_something_however_little_it_counts() {
+        // A small offset beside the noise: hardly more than that in size, and three residuals in evidence.
+        let offset = leaving(1.38, 3.0);
+        assert!(offset.within(1.5) && offset.leaves_something());
+        assert!(!leaving(1.0, 5_900.0).leaves_something(), "white noise");
+        let mut coloured = leaving(9.0, 600.0);
+        coloured.misfits[0].level = 9.0;
+        assert!(!coloured.leaves_something(), "noise that remembers itself");
     }
 }

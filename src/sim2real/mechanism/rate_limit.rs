@@ -38,8 +38,9 @@ where
             let rate = Parameter::new(name, "command/s", f64::INFINITY).within(0.0, f64::INFINITY);
             vec![rate.starting_at(&starts)]
         };
-        let from_rest = Form { name: "from_rest", parameters: rate("slew_rate") };
-        Form::only(rate("rate")).into_iter().chain([from_rest]).collect()
+        let mut forms = Form::only(rate("rate"));
+        forms.push(Form { name: "from_rest", parameters: rate("slew_rate") });
+        forms
     }
 
     /// Long enough for a ramp of some steepness to reach its command, after which all that was before is forgotten.
