@@ -79,8 +79,11 @@ const LEAP: f64 = 2.5;
 fn stale(measured: &Measured, resolution: f64) -> Vec<bool> {
     let samples = &measured.samples;
     let present = || samples.iter().flatten().copied();
-    // A sensor at the end of its range repeats itself with reason.
+    // A sensor at the end of its range repeats itself with reason, each time it comes there: what is held once may be the highest of
+    // all by chance.
     let ends = [present().fold(f64::INFINITY, f64::min), present().fold(f64::NEG_INFINITY, f64::max)];
+    let times = |end: f64| samples.chunk_by(|a, b| a == b).filter(|run| run[0] == Some(end)).count();
+    let ends = ends.map(|end| (times(end) > 1).then_some(end));
     let repeats = |w: &[Option<f64>]| w[1].is_some() && w[0].map(f64::to_bits) == w[1].map(f64::to_bits);
     let mut stale: Vec<bool> = std::iter::once(false).chain(samples.windows(2).map(repeats)).collect();
     let step = resolution * 12.0_f64.sqrt();
@@ -92,7 +95,7 @@ fn stale(measured: &Measured, resolution: f64) -> Vec<bool> {
             let held = samples[from].unwrap_or(f64::NAN);
             let after = samples.get(from + count).copied().flatten();
             let leaps = step == 0.0 || after.is_some_and(|v| (v - held).abs() > LEAP * step);
-            if ends.contains(&held) || count <= longest || !leaps {
+            if ends.contains(&Some(held)) || count <= longest || !leaps {
                 stale[from..from + count].fill(false);
             }
         }
@@ -166,8 +169,14 @@ mod tests {
 
     #[test]
     fn a_sample_that_repeats_the_one_before_is_lost_but_at_the_end_of_the_range() {
-        let samples = [0.2, 0.2, 0.1, 0.3, 0.3, 0.3, 0.5, 0.5].map(Some).to_vec();
-        assert_eq!(stale(&measured(samples), 0.0), [false, true, false, false, true, true, false, false]);
+        let samples = [0.2, 0.2, 0.1, 0.3, 0.3, 0.3, 0.5, 0.5, 0.4, 0.5, 0.5].map(Some).to_vec();
+        let lost = [1, 4, 5];
+        assert_eq!(stale(&measured(samples.clone()), 0.0), std::array::from_fn::<bool, 11, _>(|i| lost.contains(&i)));
+        // Held once, the highest value is one that was held by chance.
+        assert_eq!(
+            stale(&measured(samples[..8].to_vec()), 0.0),
+            std::array::from_fn::<bool, 8, _>(|i| [1, 4, 5, 7].contains(&i))
+        );
     }
 
     #[test]
