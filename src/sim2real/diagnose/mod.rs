@@ -22,6 +22,7 @@ mod exact;
 mod excitation;
 mod experiment;
 mod forms;
+mod free_run;
 mod gates;
 mod hypothesis;
 mod locate;
@@ -180,13 +181,11 @@ fn of_one<T: Twin>(
     let lost = recognize::lost(twin, recordings);
     let of_steps = twin.recognized(&Signs { repeated: 0.0, run: 0.0, ..signs });
     let found = Found { signs, of: twin.recognized(&signs), of_steps, lost };
-    let quiet = twin.quiet();
-    if signs.repeated <= 0.0 {
-        return answered(&quiet, recordings, held_out, &found, seed, progress);
-    }
     let channel = twin.channels().first().map(|c| c.name.clone()).unwrap_or_default();
-    let cleaned = [recordings, held_out].map(|all| recognize::without_repeats(twin, all, &channel));
-    answered(&quiet, &cleaned[0], &cleaned[1], &found, seed, progress)
+    let cleaned =
+        (signs.repeated > 0.0).then(|| [recordings, held_out].map(|all| recognize::without_repeats(twin, all, &channel)));
+    let [recordings, held_out] = cleaned.as_ref().map_or([recordings, held_out], |all| all.each_ref().map(Vec::as_slice));
+    answered(&twin.quiet(), recordings, held_out, &found, seed, progress)
 }
 
 /// What the recordings show by themselves.
@@ -230,13 +229,17 @@ fn followed(
     let (mut selection, mut rivals) = selected(&inquiry, progress);
     if evidence.window.is_some() && !selection.complete() {
         let in_windows = Inquiry { evidence: &evidence, ..inquiry };
-        (selection, rivals) = selected(&in_windows, progress);
+        let on_windows = selected(&in_windows, progress);
         // What windows have found may be near enough for a free run to tell the rest.
-        let near = selection.complete() && !selection.selected.added.is_empty();
-        let rest = near.then(|| selection.resumed(&inquiry, progress));
+        let near = on_windows.0.complete() && !on_windows.0.selected.added.is_empty();
+        let rest = near.then(|| on_windows.0.resumed(&inquiry, progress));
         match rest.map(|rest| rivals::settled(&inquiry, rest)).filter(|(rest, _)| rest.complete()) {
             Some(whole) => (selection, rivals) = whole,
-            None => inquiry = in_windows,
+            None if free_run::worse_than((&in_windows, &on_windows.0), &selection) => {}
+            None => {
+                (selection, rivals) = on_windows;
+                inquiry = in_windows;
+            }
         }
     }
     selection.mark_accepted(&candidates);

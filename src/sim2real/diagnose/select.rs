@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::forms::reformed;
+use super::free_run::{steadiest_first, strays};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::weigh::{gain, lead, needed, needed_share, pursued, ranked, squares};
@@ -20,11 +21,7 @@ const NEARLY_ALL: f64 = 9.0;
 /// Most mechanisms in a set.
 const STAGES: usize = 4;
 /// What is selected is complete if it leaves a mean squared residual of at most this many times the noise.
-const ABOVE_NOISE: f64 = 1.5;
-/// Of so many hypotheses that come near the best on windows, the one that does best in free run is taken.
-const NEAR_BEST: usize = 8;
-/// What leaves this many times as much in free run as what it builds on is not an explanation, however well it fits windows.
-const STRAYS: f64 = 1.5;
+pub(super) const ABOVE_NOISE: f64 = 1.5;
 /// Hypotheses behind the best by no more than this, and no more than so many, are tried in their other forms.
 const FORMS_MATTER: f64 = 2.0 * ACCEPT;
 const REFORMED: usize = 3;
@@ -88,12 +85,9 @@ fn selected_from<T: Twin>(
         if stage > 0 {
             children = in_best_forms(inquiry, &beam[0], children);
         }
-        steadiest_first(inquiry, &recalibrated, &mut children);
-        let Some(best) = children.first().cloned() else { break };
         let parent = best_of_stage.last().unwrap_or(&recalibrated);
-        if strays(inquiry, parent, &best) {
-            break;
-        }
+        steadiest_first(inquiry, &recalibrated, parent, &mut children);
+        let Some(best) = children.first().cloned() else { break };
         let promising = gain(inquiry, parent, &best) > ACCEPT || stage == 0 && best.leaves_something();
         best_of_stage.push(best);
         if !promising {
@@ -132,30 +126,6 @@ fn in_best_forms<T: Twin>(
         }
     }
     ranked(inquiry, parent, children)
-}
-
-/// Puts first, of the hypotheses that come near the best and are no longer, the one that does best in free run, where windows
-/// were compared.
-fn steadiest_first<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, children: &mut [Hypothesis<T>]) {
-    let Some(best) = children.first() else { return };
-    let close = |child: &Hypothesis<T>| child.free() <= best.free() && lead(inquiry, first, best, child) <= ACCEPT;
-    let near: Vec<usize> = (0..children.len().min(NEAR_BEST)).filter(|k| close(&children[*k])).collect();
-    if near.len() < 2 {
-        return;
-    }
-    let left: Vec<Option<f64>> = near.par_iter().map(|k| inquiry.left_in_free_run(&children[*k])).collect();
-    let least = near.iter().zip(&left).filter_map(|(k, left)| Some((*k, (*left)?))).min_by(|a, b| a.1.total_cmp(&b.1));
-    if let Some((k, _)) = least {
-        children[..=k].rotate_right(1);
-    }
-}
-
-/// Whether `whole` fits windows better than `less` and a free run much worse.
-fn strays<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, whole: &Hypothesis<T>) -> bool {
-    match (inquiry.left_in_free_run(less), inquiry.left_in_free_run(whole)) {
-        (Some(less), Some(whole)) => whole > STRAYS * less,
-        _ => false,
-    }
 }
 
 impl<T: Twin> Selection<T> {

@@ -1,0 +1,68 @@
+//! What hypotheses that were compared on windows do in free run.
+
+use rayon::prelude::*;
+
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::select::{ABOVE_NOISE, ACCEPT, Selection};
+use super::weigh::lead;
+use crate::sim2real::Twin;
+
+/// Of so many hypotheses that come near the best on windows, the one that does best in free run is taken.
+const NEAR_BEST: usize = 8;
+/// What leaves this many times as much in free run as what it builds on is not an explanation, however well it fits windows.
+const STRAYS: f64 = 1.5;
+
+/// Puts first, of the hypotheses that come near the best and are no longer, the one that does best in free run, where windows
+/// were compared; what goes astray there beside `parent`, on which all build, is left out.
+pub(super) fn steadiest_first<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    parent: &Hypothesis<T>,
+    children: &mut Vec<Hypothesis<T>>,
+) {
+    for _ in 0..NEAR_BEST {
+        nearest_in_free_run(inquiry, first, children);
+        match children.first() {
+            Some(best) if strays(inquiry, parent, best) => drop(children.remove(0)),
+            _ => return,
+        }
+    }
+    children.clear();
+}
+
+fn nearest_in_free_run<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, children: &mut [Hypothesis<T>]) {
+    let Some(best) = children.first() else { return };
+    let close = |child: &Hypothesis<T>| child.free() <= best.free() && lead(inquiry, first, best, child) <= ACCEPT;
+    let near: Vec<usize> = (0..children.len().min(NEAR_BEST)).filter(|k| close(&children[*k])).collect();
+    if near.len() < 2 {
+        return;
+    }
+    let left: Vec<Option<f64>> = near.par_iter().map(|k| inquiry.left_in_free_run(&children[*k])).collect();
+    let least = near.iter().zip(&left).filter_map(|(k, left)| Some((*k, (*left)?))).min_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((k, _)) = least {
+        children[..=k].rotate_right(1);
+    }
+}
+
+/// Whether `whole` fits windows better than `less` and a free run much worse.
+///
+/// What leaves nothing but noise of windows of which `less` leaves more may: where a plant can come to rest in one place or in the
+/// next, a free run tells which it came to, and not how.
+pub(super) fn strays<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, whole: &Hypothesis<T>) -> bool {
+    if whole.within(ABOVE_NOISE) && !less.within(ABOVE_NOISE) {
+        return false;
+    }
+    match (inquiry.left_in_free_run(less), inquiry.left_in_free_run(whole)) {
+        (Some(less), Some(whole)) => whole > STRAYS * less,
+        _ => false,
+    }
+}
+
+/// Whether what was selected on windows does so much worse in free run than what was selected there, that it cannot be what is
+/// missing.
+pub(super) fn worse_than<T: Twin>(windows: (&Inquiry<'_, T>, &Selection<T>), free_run: &Selection<T>) -> bool {
+    let (inquiry, selection) = windows;
+    let left = inquiry.left_in_free_run(&selection.selected);
+    let least = free_run.selected.fit.objective();
+    !selection.complete() && !free_run.selected.added.is_empty() && left.is_some_and(|left| left > STRAYS * least)
+}
