@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::confidence::by_evidence;
+use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::select::Selection;
@@ -41,6 +41,10 @@ const HARDLY_LEFT: f64 = 2.0;
 /// One of several that is less likely than this beside its rivals is worth no name at all.
 const HARDLY_IT: f64 = 0.05;
 
+/// Of three, one that is less likely than this to be right, or to have the right one among its rivals, stands for what the forms of the
+/// others are off by.
+const LIKELY: f64 = 0.6;
+
 /// Puts rivals that do better in the place of what was selected, until none does; leaves out what might as well be
 /// anything; then lists the rivals that remain.
 pub(super) fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, selection: Selection<T>) -> (Selection<T>, Vec<Place>) {
@@ -60,8 +64,19 @@ fn anybodys<T: Twin>(selection: &Selection<T>, places: &[Place]) -> Option<usize
         let less = &selection.without[*place];
         let little = share(&selection.recalibrated, less, whole) < SHARE && less.within(HARDLY_LEFT);
         let likely = by_evidence(&places[*place]).0;
-        little && likely < ANYBODYS || likely < HARDLY_IT
+        little && likely < ANYBODYS || likely < HARDLY_IT || stand_in(places) == Some(*place)
     })
+}
+
+/// The one of three or more that is hardly likelier than not, or to have the right one among its rivals, where all others are. Where
+/// more than one is so unsure, all of them together may stand for something unknown.
+fn stand_in(places: &[Place]) -> Option<usize> {
+    let unsure = |place: &Place| {
+        let (own, others) = calibrated(place, &Doubts { others: places.len() - 1, ..Doubts::default() });
+        own + others.iter().sum::<f64>() < LIKELY
+    };
+    let mut unsure = (0..places.len()).filter(|place| unsure(&places[*place]));
+    unsure.next().filter(|_| places.len() > 2 && unsure.next().is_none())
 }
 
 /// Puts rivals that do better in the place of what was selected, until none does.
@@ -190,4 +205,25 @@ fn loss<T: Twin>(
         };
     }
     loss
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_one_unsure_name_of_three_is_a_stand_in() {
+        let place = |gain: f64| Place { gain, nearest: None, others: Vec::new() };
+        let [sure, unsure] = [place(5_000.0), place(100.0)];
+        assert_eq!(stand_in(&[sure.clone(), unsure.clone(), sure.clone()]), Some(1));
+        assert_eq!(stand_in(&[sure.clone(), unsure.clone()]), None, "a second may well be weak");
+        assert_eq!(
+            stand_in(&[unsure.clone(), unsure.clone(), sure.clone()]),
+            None,
+            "together they stand for something else"
+        );
+        // A name is as sure as it and its rivals are together.
+        let shared = Place { gain: 5_000.0, nearest: Some(0.0), others: vec![(7, 0.0)] };
+        assert_eq!(stand_in(&[sure.clone(), shared, sure]), None);
+    }
 }
