@@ -12,6 +12,8 @@ pub(super) const SHARE: f64 = 0.01;
 const SHARE_OF_MORE: f64 = 0.03;
 /// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
 const COMPLETES: f64 = 0.8;
+/// What is of the size and colour of noise holds something besides, where so large a part of it is explained.
+const MORE_THAN_NOISE: f64 = 0.15;
 /// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
 const INFORMATIVE_ROWS: usize = 25;
 /// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were.
@@ -202,7 +204,8 @@ pub(super) fn needed<T: Twin>(
         || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), last)| {
             let explained = less.sum_of_squares - last.sum_of_squares;
             let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
-            explained >= share_of(whole.added.len()) * all || !less.like_noise() && explained >= COMPLETES * left
+            let noise_alone = less.like_noise() && explained < MORE_THAN_NOISE * less.sum_of_squares;
+            explained >= share_of(whole.added.len()) * all || !noise_alone && explained >= COMPLETES * left
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let change = || (0..rows).map(|i| less.fit.residual[i] - whole.fit.residual[i]);
