@@ -15,23 +15,30 @@ pub(super) struct Estimate {
     pub rate_std: f64,
 }
 
-/// Rows on either side that a local estimate uses.
+/// Rows on either side that a local estimate uses, ...
 const REACH: usize = 7;
+/// ... the fewest samples it needs, ...
+const FEWEST: usize = 5;
+/// ... and how often it looks twice as far for them where samples are few.
+const FARTHER: u32 = 4;
 
 /// A parabola by least squares through the samples of `channel` around `row`; where there is a channel `rate`, its sample.
 pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row: usize) -> Option<Estimate> {
     let samples = &recording.channel(channel)?.samples;
-    let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(recording.len());
     // Asked for at every row: without room of its own for each.
     let mut points = [(0.0, 0.0); 2 * REACH + 1];
     let mut count = 0;
-    for (time, y) in rows.filter_map(|i| Some((recording.time[i] - recording.time[row], samples[i]?))) {
-        points[count] = (time, y);
-        count += 1;
+    for reach in (0..=FARTHER).map(|k| REACH << k) {
+        let rows = row.saturating_sub(reach)..(row + reach + 1).min(recording.len());
+        let present = rows.filter_map(|i| Some((recording.time[i] - recording.time[row], samples[i]?)));
+        count = points.iter_mut().zip(present).map(|(point, sample)| *point = sample).count();
+        if count >= FEWEST {
+            break;
+        }
     }
     let points = &points[..count];
     let scale = points.iter().map(|(t, _)| t.abs()).fold(0.0, f64::max);
-    if points.len() < 5 || scale <= 0.0 {
+    if points.len() < FEWEST || scale <= 0.0 {
         let (_, value) = points.first()?;
         return Some(Estimate { value: *value, rate: 0.0, rate_std: f64::INFINITY });
     }
@@ -134,5 +141,16 @@ mod tests {
         let middle = local(&recording, "q", "qd", 20).unwrap();
         assert!((middle.value - 1.52).abs() < 1e-9 && (middle.rate - 3.2).abs() < 1e-9, "{middle:?}");
         assert!(local(&recording, "none", "", 20).is_none());
+    }
+
+    #[test]
+    fn where_samples_are_few_it_looks_farther() {
+        let time: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.01).collect();
+        let parabola = |t: f64| 1.0 + 2.0 * t + 3.0 * t * t;
+        let one_in_ten = time.iter().enumerate().map(|(i, t)| (i % 10 == 0).then(|| parabola(*t))).collect();
+        let measured = vec![Measured { channel: "q".into(), unit: "m".into(), samples: one_in_ten }];
+        let recording = Recording { name: String::new(), time, stimulus: (), measured };
+        let begun = local(&recording, "q", "qd", 3).unwrap();
+        assert!((begun.value - parabola(0.03)).abs() < 1e-9 && (begun.rate - 2.18).abs() < 1e-9, "{begun:?}");
     }
 }

@@ -25,7 +25,7 @@ fn floor<S: Simulator>(simulator: &S, recording: &Recording<S::Stimulus>, measur
     let present: Vec<f64> = measured.samples.iter().flatten().copied().collect();
     let rounding = simulator.resolution(recording, &measured.channel);
     let scatter = match simulator.clock() {
-        Clock::Sampled { .. } => fourth_difference(&measured.samples),
+        Clock::Sampled { .. } => scatter(&recording.time, &measured.samples),
         // Messages are no samples of one signal: their differences say nothing of their noise.
         Clock::Event => 0.0,
     };
@@ -48,6 +48,38 @@ pub(super) fn fourth_difference(samples: &[Option<f64>]) -> f64 {
         })
         .collect();
     if differences.is_empty() { 0.0 } else { median(differences) / 0.674_489_75 / 70.0_f64.sqrt() }
+}
+
+/// The same of samples of which hardly any five are next to each other: by the fourth divided differences of those that are there, of
+/// which the motion itself makes the larger ones.
+fn scatter(time: &[f64], samples: &[Option<f64>]) -> f64 {
+    let next_to_each_other = fourth_difference(samples);
+    if next_to_each_other > 0.0 {
+        return next_to_each_other;
+    }
+    let present: Vec<[f64; 2]> = time.iter().zip(samples).filter_map(|(t, y)| Some([*t, (*y)?])).collect();
+    let mut differences: Vec<f64> = present.windows(FIVE).map(divided_difference).filter(|d| d.is_finite()).collect();
+    if differences.is_empty() {
+        return 0.0;
+    }
+    differences.sort_by(f64::total_cmp);
+    // The first quartile of what is left of white noise alone.
+    differences[differences.len() / 4] / 0.318_639_36
+}
+
+/// Samples of a fourth difference.
+const FIVE: usize = 5;
+
+/// The fourth divided difference of samples at any times, of variance 1 for white noise of variance 1.
+fn divided_difference(points: &[[f64; 2]]) -> f64 {
+    let weight = |k: usize| -> f64 {
+        points.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, [t, _])| 1.0 / (points[k][0] - t)).product()
+    };
+    let (sum, squares) = points.iter().enumerate().fold((0.0, 0.0), |(sum, squares), (k, [_, y])| {
+        let weight = weight(k);
+        (sum + weight * y, squares + weight * weight)
+    });
+    (sum / squares.sqrt()).abs()
 }
 
 /// The median; the values need not be sorted, but there must be one.
@@ -77,5 +109,21 @@ mod tests {
             })
             .collect();
         assert!((fourth_difference(&samples) - 0.002).abs() < 1e-4);
+    }
+
+    #[test]
+    fn finds_the_noise_of_samples_that_are_far_apart() {
+        let mut rng = Seed(4).stream("noise");
+        let time: Vec<f64> = (0..9_000).map(|i| f64::from(i) * 0.01).collect();
+        // Two of three samples are lost, and now and then one more.
+        let samples: Vec<Option<f64>> = (0..9_000)
+            .map(|i| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                (i % 3 == 0 && i % 33 != 0).then_some((f64::from(i) * 0.01).sin() + 0.002 * noise)
+            })
+            .collect();
+        assert_eq!(fourth_difference(&samples), 0.0, "no five are next to each other");
+        assert!((scatter(&time, &samples) - 0.002).abs() < 2e-4, "{}", scatter(&time, &samples));
+        assert_eq!(scatter(&time[..12], &samples[..12]), 0.0, "nor are there five");
     }
 }
