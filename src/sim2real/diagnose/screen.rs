@@ -87,7 +87,7 @@ impl Ground {
             column.component_mul_assign(&scale);
         }
         let hidden = orthonormal(jacobian);
-        let residual = without(&followed.component_mul(&scale), &hidden);
+        let residual = without(followed.component_mul(&scale), &hidden);
         Self { values: values.to_vec(), basis, state, followed, scale, hidden, residual }
     }
 }
@@ -127,8 +127,12 @@ fn orthonormal(columns: DMatrix<f64>) -> DMatrix<f64> {
     if basis.is_empty() { DMatrix::zeros(columns.nrows(), 0) } else { DMatrix::from_columns(&basis) }
 }
 
-fn without(v: &DVector<f64>, basis: &DMatrix<f64>) -> DVector<f64> {
-    if basis.ncols() == 0 { v.clone() } else { v - basis * basis.tr_mul(v) }
+fn without(mut v: DVector<f64>, basis: &DMatrix<f64>) -> DVector<f64> {
+    if basis.ncols() > 0 {
+        let along = basis.tr_mul(&v);
+        v.gemv(-1.0, basis, &along, 1.0);
+    }
+    v
 }
 
 /// A point of a candidate's parameters as screening saw it.
@@ -136,9 +140,7 @@ struct Tried {
     score: f64,
     survival: f64,
     start: Vec<f64>,
-    /// Of length 1.
-    signature: DVector<f64>,
-    /// The length it had.
+    /// The length of its signature.
     length: f64,
 }
 
@@ -160,15 +162,17 @@ fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usi
                 let signatures: Vec<DVector<f64>> =
                     followed.by_ref().take(points.len()).map(|residual| &ground.followed - residual).collect();
                 loudest = signatures.iter().map(|s| s.norm()).filter(|n| n.is_finite()).fold(loudest, f64::max);
-                tried.extend(explained(candidate, points, &signatures, ground));
+                let Some((one, signature)) = explained(candidate, points, signatures, ground) else { continue };
+                // Of all points but the best the numbers are enough: signatures are as long as the recordings.
+                if best.as_ref().is_none_or(|best| one.score > best.score) {
+                    let (score, survival) = (one.score, one.survival);
+                    best = Some(Screened { number, score, survival, excited: true, starts: Vec::new(), signature });
+                }
+                tried.push(one);
             }
         }
         tried.sort_by(|a, b| b.score.total_cmp(&a.score));
         let whole = |start: &[f64]| -> Vec<f64> { ground.values.iter().chain(start).copied().collect() };
-        if let Some(one) = tried.first().filter(|one| best.as_ref().is_none_or(|b| one.score > b.score)) {
-            let (score, survival, signature) = (one.score.max(0.0), one.survival, one.signature.clone());
-            best = Some(Screened { number, score, survival, excited: true, starts: Vec::new(), signature });
-        }
         for one in &tried {
             starts.extend(scaled(candidate, one, ground).map(|start| (one.score, whole(&start))));
             starts.push((one.score, whole(&one.start)));
@@ -177,7 +181,7 @@ fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usi
     // Stable: of equal scores the refitted twin's come first.
     starts.sort_by(|a, b| b.0.total_cmp(&a.0));
     let starts = starts.into_iter().map(|(_, start)| start).collect();
-    best.map(|best| Screened { excited: loudest > EXCITED, starts, ..best })
+    best.map(|best| Screened { score: best.score.max(0.0), excited: loudest > EXCITED, starts, ..best })
 }
 
 /// The points to follow: each entry holds one point, or, for a law with parameters it is proportional to, one point for
@@ -215,12 +219,22 @@ fn trials(candidate: &Candidate) -> Vec<Vec<Vec<f64>>> {
     probe.into_iter().chain(combined).map(|point| vec![point]).collect()
 }
 
-/// How much of the misfit the signatures of `points` explain together, and where that would have the parameters.
-fn explained(candidate: &Candidate, points: &[Vec<f64>], signatures: &[DVector<f64>], ground: &Ground) -> Option<Tried> {
+/// How much of the misfit the signatures of `points` explain together, where that would have the parameters, and the signature of
+/// it, projected and of length 1.
+fn explained(
+    candidate: &Candidate,
+    points: &[Vec<f64>],
+    signatures: Vec<DVector<f64>>,
+    ground: &Ground,
+) -> Option<(Tried, DVector<f64>)> {
     let parameters = &candidate.form.parameters;
     let linear: Vec<usize> = (0..parameters.len()).filter(|k| parameters[*k].linear).collect();
-    let projected: Vec<(DVector<f64>, f64)> =
-        signatures.iter().map(|s| s.component_mul(&ground.scale)).map(|s| (without(&s, &ground.hidden), s.norm())).collect();
+    let projected = |mut signature: DVector<f64>| {
+        signature.component_mul_assign(&ground.scale);
+        let whole = signature.norm();
+        (without(signature, &ground.hidden), whole)
+    };
+    let projected: Vec<(DVector<f64>, f64)> = signatures.into_iter().map(projected).collect();
     let misfit = ground.residual.norm();
     let usable = |(p, whole): &(DVector<f64>, f64)| p.norm() > 1e-9 * whole && whole.is_finite() && *whole > 0.0;
     if misfit <= 0.0 {
@@ -231,7 +245,7 @@ fn explained(candidate: &Candidate, points: &[Vec<f64>], signatures: &[DVector<f
         let length = signature.norm();
         let score = signature.dot(&ground.residual) / (length * misfit);
         let survival = length / whole;
-        return Some(Tried { score, survival, start: points[0].clone(), signature: signature / length, length });
+        return Some((Tried { score, survival, start: points[0].clone(), length }, signature / length));
     }
     let mut used: Vec<usize> = (0..projected.len()).filter(|i| usable(&projected[*i])).collect();
     loop {
@@ -259,13 +273,8 @@ fn explained(candidate: &Candidate, points: &[Vec<f64>], signatures: &[DVector<f
                 let length = signature.norm();
                 let whole: f64 = used.iter().zip(weights.iter()).map(|(i, w)| (w * projected[*i].1).powi(2)).sum();
                 let survival = (length / whole.sqrt()).min(1.0);
-                return (length > 0.0).then(|| Tried {
-                    score: length / misfit,
-                    survival,
-                    start,
-                    signature: signature / length,
-                    length,
-                });
+                let tried = Tried { score: length / misfit, survival, start, length };
+                return (length > 0.0).then(|| (tried, signature / length));
             }
         }
     }
@@ -273,10 +282,10 @@ fn explained(candidate: &Candidate, points: &[Vec<f64>], signatures: &[DVector<f
 
 /// A law that would have to act the other way round, at its first start: what refitting hides most of may turn round once
 /// it is fitted jointly.
-fn opposed(points: &[Vec<f64>], (signature, whole): (DVector<f64>, f64)) -> Option<Tried> {
+fn opposed(points: &[Vec<f64>], (signature, whole): (DVector<f64>, f64)) -> Option<(Tried, DVector<f64>)> {
     let length = signature.norm();
     let start = points.first()?.clone();
-    Some(Tried { score: 0.0, survival: length / whole, start, signature: signature / length, length })
+    Some((Tried { score: 0.0, survival: length / whole, start, length }, signature / length))
 }
 
 /// The start moved along its own direction as far as the misfit reaches, where its law has one parameter and that is of

@@ -176,11 +176,12 @@ impl<S: Simulator> Problem<'_, S> {
             let followed = self.followed_by(part, &lanes);
             followed
                 .into_iter()
-                .map(|residual| {
+                .map(|mut residual| {
                     // The priors' rows of the basis meet zeros: only its measured rows count.
                     let known = basis[number].rows(0, residual.len());
-                    let explained = known * known.tr_mul(&residual);
-                    residual - explained
+                    let along = known.tr_mul(&residual);
+                    residual.gemv(-1.0, &known, &along, 1.0);
+                    residual
                 })
                 .collect()
         };
