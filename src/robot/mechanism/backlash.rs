@@ -45,7 +45,7 @@ where
         let widths = [0.05, 0.2, 0.5].map(|fraction| fraction * typical.command);
         let gaps = [0.01, 0.05, 0.2, 0.5].map(|fraction| fraction * typical.output);
         let gap = || Parameter::new("gap", "rad", 0.0).within(0.0, f64::INFINITY).starting_at(&gaps);
-        let share = || Parameter::new("motor_share", "", 0.5).within(0.05, 0.95).starting_at(&[0.3, 0.5, 0.8]);
+        let share = || Parameter::new("motor_share", "", 0.5).within(0.05, 0.95).starting_at(&[0.3, 0.55, 0.8]);
         let friction =
             Parameter::new("motor_friction", "N m", 0.0).within(0.0, f64::INFINITY).starting_at(&[0.1 * typical.effort]);
         // What bends by a part of the smallest gap under the usual effort, and by as much as the middle one.
