@@ -19,8 +19,8 @@ pub(super) struct Estimate {
 const REACH: usize = 7;
 /// ... the fewest samples it needs, ...
 const FEWEST: usize = 5;
-/// ... and how often it looks twice as far for them where samples are few.
-const FARTHER: u32 = 4;
+/// ... and how many rows away it looks for the next of them where samples are few.
+const FARTHEST: usize = 16 * REACH;
 
 /// A parabola by least squares through the samples of `channel` around `row`; where there is a channel `rate`, its sample.
 pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row: usize) -> Option<Estimate> {
@@ -28,15 +28,21 @@ pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row:
     // Asked for at every row: without room of its own for each.
     let mut points = [(0.0, 0.0); 2 * REACH + 1];
     let mut count = 0;
-    for reach in (0..=FARTHER).map(|k| REACH << k) {
-        let rows = row.saturating_sub(reach)..(row + reach + 1).min(recording.len());
-        let present = rows.filter_map(|i| Some((recording.time[i] - recording.time[row], samples[i]?)));
-        count = points.iter_mut().zip(present).map(|(point, sample)| *point = sample).count();
-        if count >= FEWEST {
-            break;
+    let mut take = |i: usize| {
+        if let Some(y) = samples[i] {
+            points[count] = (recording.time[i] - recording.time[row], y);
+            count += 1;
         }
+        count
+    };
+    let near = row.saturating_sub(REACH)..(row + REACH + 1).min(recording.len());
+    let mut taken = near.map(&mut take).last().unwrap_or(0);
+    let mut farther = REACH + 1..=FARTHEST;
+    while let Some(away) = farther.next().filter(|_| taken < FEWEST) {
+        let both = [row.checked_sub(away), Some(row + away).filter(|i| *i < recording.len())];
+        taken = both.into_iter().flatten().map(&mut take).last().unwrap_or(taken);
     }
-    let points = &points[..count];
+    let points = &points[..taken];
     let scale = points.iter().map(|(t, _)| t.abs()).fold(0.0, f64::max);
     if points.len() < FEWEST || scale <= 0.0 {
         let (_, value) = points.first()?;
@@ -152,5 +158,9 @@ mod tests {
         let recording = Recording { name: String::new(), time, stimulus: (), measured };
         let begun = local(&recording, "q", "qd", 3).unwrap();
         assert!((begun.value - parabola(0.03)).abs() < 1e-9 && (begun.rate - 2.18).abs() < 1e-9, "{begun:?}");
+        // Where there are too few, the nearest is all that is known.
+        let mut alone = recording;
+        alone.measured[0].samples.iter_mut().enumerate().filter(|(i, _)| ![50, 90].contains(i)).for_each(|(_, y)| *y = None);
+        assert_eq!(local(&alone, "q", "qd", 100).unwrap().value, parabola(alone.time[90]));
     }
 }
