@@ -19,30 +19,31 @@ pub(super) struct Estimate {
 const REACH: usize = 7;
 /// ... the fewest samples it needs, ...
 const FEWEST: usize = 5;
-/// ... and how many rows away it looks for the next of them where samples are few.
+/// ... how many times as far as the nearest of them is away they must reach, for a parabola leads astray where it goes on from
+/// what is close together, ...
+const SPREAD: f64 = 2.0;
+/// ... how many rows away it looks for the next of them where samples are few, and how many it takes at the most.
 const FARTHEST: usize = 16 * REACH;
+const MOST: usize = 64;
 
 /// A parabola by least squares through the samples of `channel` around `row`; where there is a channel `rate`, its sample.
 pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row: usize) -> Option<Estimate> {
     let samples = &recording.channel(channel)?.samples;
     // Asked for at every row: without room of its own for each.
-    let mut points = [(0.0, 0.0); 2 * REACH + 1];
+    let mut points = [(0.0, 0.0); MOST];
     let mut count = 0;
-    let mut take = |i: usize| {
+    let near = row.saturating_sub(REACH)..(row + REACH + 1).min(recording.len());
+    let beyond = (REACH + 1..=FARTHEST).flat_map(|away| [row.checked_sub(away), Some(row + away)]);
+    for (looked_at, i) in near.clone().chain(beyond.flatten().filter(|i| *i < recording.len())).enumerate() {
+        if looked_at >= near.len() && (count == MOST || enough(&points[..count])) {
+            break;
+        }
         if let Some(y) = samples[i] {
             points[count] = (recording.time[i] - recording.time[row], y);
             count += 1;
         }
-        count
-    };
-    let near = row.saturating_sub(REACH)..(row + REACH + 1).min(recording.len());
-    let mut taken = near.map(&mut take).last().unwrap_or(0);
-    let mut farther = REACH + 1..=FARTHEST;
-    while let Some(away) = farther.next().filter(|_| taken < FEWEST) {
-        let both = [row.checked_sub(away), Some(row + away).filter(|i| *i < recording.len())];
-        taken = both.into_iter().flatten().map(&mut take).last().unwrap_or(taken);
     }
-    let points = &points[..taken];
+    let points = &points[..count];
     let scale = points.iter().map(|(t, _)| t.abs()).fold(0.0, f64::max);
     if points.len() < FEWEST || scale <= 0.0 {
         let (_, value) = points.first()?;
@@ -65,6 +66,14 @@ pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row:
         rate: measured.unwrap_or(solution[1] / scale),
         rate_std: (variance * inverse[(1, 1)]).sqrt() / scale,
     })
+}
+
+/// Whether so many samples, at times from the row in question, tell of it.
+fn enough(points: &[(f64, f64)]) -> bool {
+    let nearest = points.iter().map(|(t, _)| t.abs()).fold(f64::INFINITY, f64::min);
+    let first = points.iter().map(|(t, _)| *t).fold(f64::INFINITY, f64::min);
+    let last = points.iter().map(|(t, _)| *t).fold(f64::NEG_INFINITY, f64::max);
+    points.len() >= FEWEST && last - first >= SPREAD * nearest
 }
 
 /// The same at every row; zeros where nothing was measured nearby.
@@ -158,9 +167,18 @@ mod tests {
         let recording = Recording { name: String::new(), time, stimulus: (), measured };
         let begun = local(&recording, "q", "qd", 3).unwrap();
         assert!((begun.value - parabola(0.03)).abs() < 1e-9 && (begun.rate - 2.18).abs() < 1e-9, "{begun:?}");
+        // Noise is not made more of than a few times, where a run is lost at an end.
+        let jagged = |i: usize| if i.is_multiple_of(2) { 1e-3 } else { -1e-3 };
+        let run_lost = recording.time.iter().enumerate().map(|(i, t)| (i >= 20).then(|| parabola(*t) + jagged(i))).collect();
+        let mut recording = recording;
+        recording.measured[0].samples = run_lost;
+        let begun = local(&recording, "q", "qd", 0).unwrap();
+        assert!((begun.value - 1.0).abs() < 5e-3, "{begun:?}");
         // Where there are too few, the nearest is all that is known.
+        let kept = [50, 90].map(|i| recording.time[i]);
         let mut alone = recording;
-        alone.measured[0].samples.iter_mut().enumerate().filter(|(i, _)| ![50, 90].contains(i)).for_each(|(_, y)| *y = None);
+        let known = |t: &f64| kept.contains(t).then(|| parabola(*t));
+        alone.measured[0].samples = alone.time.iter().map(known).collect();
         assert_eq!(local(&alone, "q", "qd", 100).unwrap().value, parabola(alone.time[90]));
     }
 }
