@@ -145,9 +145,10 @@ fn hardening(twist: f64, rate: f64) -> f64 {
     20.0 * twist * (1.0 + (twist / 0.03).powi(2)) + 0.1 * (20.0 * 0.24 * INERTIA).sqrt() * rate
 }
 
-fn bouc_wen(x: State, u: f64, torque: f64, angle: f64, n: i32) -> Forces {
+fn bouc_wen(x: State, u: f64, torque: f64, angle: f64, [n, sigma]: [f64; 2]) -> Forces {
     let (w, v) = (x[2], x[1]);
-    let rate = (v - 0.5 * v.abs() * w.abs().powi(n - 1) * w - 0.5 * v * w.abs().powi(n)) / angle;
+    let power = w.abs().powf(n);
+    let rate = (v - sigma * v.abs() * power * w.signum() + (sigma - 1.0) * v * power) / angle;
     Forces { more: [rate, 0.0], ..plain(x, u, -torque * w) }
 }
 
@@ -336,21 +337,28 @@ const CASES: &[Case] = &[
         mechanism: "coulomb_friction",
         form: "presliding",
         values: &[0.2, 0.02],
-        law: |_, x, u| bouc_wen(x, u, 0.2, 0.02, 1),
+        law: |_, x, u| bouc_wen(x, u, 0.2, 0.02, [1.0, 0.5]),
         most: 1e-4,
     },
     Case {
         mechanism: "hysteresis",
         form: "soft",
         values: &[0.3, 0.1],
-        law: |_, x, u| bouc_wen(x, u, 0.3, 0.1, 1),
+        law: |_, x, u| bouc_wen(x, u, 0.3, 0.1, [1.0, 0.5]),
         most: 2e-5,
     },
     Case {
         mechanism: "hysteresis",
         form: "sharp",
         values: &[0.3, 0.1],
-        law: |_, x, u| bouc_wen(x, u, 0.3, 0.1, 2),
+        law: |_, x, u| bouc_wen(x, u, 0.3, 0.1, [2.0, 0.5]),
+        most: 2e-5,
+    },
+    Case {
+        mechanism: "hysteresis",
+        form: "bouc_wen",
+        values: &[0.3, 0.1, 0.6, 1.3],
+        law: |_, x, u| bouc_wen(x, u, 0.3, 0.1, [0.6, 1.3]),
         most: 2e-5,
     },
     Case {

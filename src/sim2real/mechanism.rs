@@ -161,6 +161,10 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn finishing(&self, _form: usize) -> bool {
         false
     }
+    /// Whether form `form` is a wider law of which a plainer form is one case: tried only in the place of that, where it does best.
+    fn general(&self, _form: usize) -> bool {
+        false
+    }
     /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.
     fn recognized(&self, _form: usize, _signs: &Signs) -> Option<Vec<f64>> {
         None

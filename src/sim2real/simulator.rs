@@ -91,6 +91,8 @@ pub struct Candidate {
     pub form_index: usize,
     /// Whether it only rounds what is reported, and is tried as it is when everything else is fitted.
     pub finishing: bool,
+    /// Whether it is a wider law of which a plainer form is one case, and is tried only in the place of that.
+    pub general: bool,
 }
 
 /// A simulator that can be given mechanisms it lacks.

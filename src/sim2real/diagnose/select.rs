@@ -10,7 +10,7 @@ use super::weigh::{gain, lead, needed, needed_share, pursued, ranked, squares};
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
 use crate::sim2real::identify::Effort;
-use crate::sim2real::{Candidate, Twin};
+use crate::sim2real::{About, Candidate, Twin};
 
 /// A mechanism must gain more than this to be added.
 pub(super) const ACCEPT: f64 = 10.0;
@@ -272,7 +272,7 @@ fn once<T: Twin>(beam: &[Hypothesis<T>], jobs: &mut [(usize, Screened, bool)]) {
     }
 }
 
-/// The forms not fitted yet of those mechanisms that stand best beside the best parent.
+/// The forms not fitted yet of those mechanisms that stand best beside the best parent; a wider law of the very best alone.
 fn further_forms<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     parent: &Hypothesis<T>,
@@ -289,7 +289,8 @@ fn further_forms<T: Twin>(
         }
     }
     let further = |(place, one, fitted): &(usize, Screened, bool)| {
-        *place == 0 && !fitted && one.excited && best.contains(&name(one.number))
+        let known = if inquiry.candidates[one.number].general { &best[..best.len().min(1)] } else { &best };
+        *place == 0 && !fitted && one.excited && known.contains(&name(one.number))
     };
     jobs.iter().map(further).collect()
 }
@@ -342,9 +343,9 @@ fn chosen<T: Twin>(
         .iter()
         .enumerate()
         .map(|(rank, one)| {
-            let name = inquiry.candidates[one.number].about.name;
+            let Candidate { about: About { name, .. }, general, .. } = &inquiry.candidates[one.number];
             let promising = all || one.score > 0.0 && (rank < always || hopeful(one.score));
-            if !one.excited || !promising || mechanisms.contains(&name) {
+            if *general || !one.excited || !promising || mechanisms.contains(name) {
                 return false;
             }
             let alike = || one.signature.dot(&screened[0].signature).abs() > ALIKE;
