@@ -1,4 +1,5 @@
-//! Cases of development seeds of the blind benchmark that were once answered wrongly, each for a reason of its own.
+//! Cases of the blind benchmark, of development seeds and of test seeds that are spent, that were once answered wrongly, each for
+//! a reason of its own.
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
@@ -29,4 +30,19 @@ fn a_third_name_does_not_stand_for_the_form_of_the_first_two() {
     let trial = tried(45, 133);
     assert_eq!(names(&trial), ["eccentricity", "hysteresis"]);
     assert_ne!(trial.verdict, Verdict::Unexplained);
+}
+
+/// What begins to yield at once leaves no second law and no unexplained rest where the knee of its loop may have any shape.
+#[test]
+fn a_loop_may_have_any_knee() {
+    let trial = tried(1005, 82);
+    assert_eq!(names(&trial), ["hysteresis", "payload_change"]);
+    assert_ne!(trial.verdict, Verdict::Unexplained);
+}
+
+/// A run of samples lost at one end: what is told of the first moments must not go astray on the few samples next to it.
+#[test]
+fn a_stop_is_found_though_a_run_of_samples_is_lost() {
+    let trial = tried(45, 41);
+    assert_eq!(names(&trial), ["dropout", "end_stop"]);
 }

@@ -44,39 +44,46 @@ const HARDLY_IT: f64 = 0.05;
 /// Of three, one that is less likely than this to be right, or to have the right one among its rivals, stands for what the forms of the
 /// others are off by.
 const LIKELY: f64 = 0.6;
+/// The same of a special case beside the law that contains it.
+const LIKELY_BESIDE_ITS_LAW: f64 = 0.8;
 
 /// Puts rivals that do better in the place of what was selected, until none does; leaves out what might as well be
 /// anything; then lists the rivals that remain.
 pub(super) fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, selection: Selection<T>) -> (Selection<T>, Vec<Place>) {
     let (mut selection, mut places) = swapped(inquiry, selection);
-    while let Some(place) = anybodys(&selection, &places) {
+    while let Some(place) = anybodys(inquiry, &selection, &places) {
         selection = selection.dropped(inquiry, place);
         places = rivals(inquiry, &selection);
     }
     (selection, places)
 }
 
-/// The mechanism, one of several, that explains a small share only and is hardly more likely than its rivals, or that others beat of
-/// which none is needed in its place.
-fn anybodys<T: Twin>(selection: &Selection<T>, places: &[Place]) -> Option<usize> {
+/// The mechanism, one of several, that explains a small share only and is hardly more likely than its rivals, that others beat of
+/// which none is needed in its place, or that stands for what the forms of others are off by.
+fn anybodys<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, places: &[Place]) -> Option<usize> {
+    let about = |place: usize| &inquiry.candidates[selection.selected.added[place]].about;
     let whole = &selection.selected;
     (0..places.len()).filter(|_| places.len() > 1).find(|place| {
         let less = &selection.without[*place];
         let little = share(&selection.recalibrated, less, whole) < SHARE && less.within(HARDLY_LEFT);
         let likely = by_evidence(&places[*place]).0;
-        little && likely < ANYBODYS || likely < HARDLY_IT || stand_in(places) == Some(*place)
+        let contained = (0..places.len()).any(|other| about(other).contains.contains(&about(*place).name));
+        let of_another = contained && less.within(HARDLY_LEFT) && sure(places, *place) < LIKELY_BESIDE_ITS_LAW;
+        little && likely < ANYBODYS || likely < HARDLY_IT || of_another || stand_in(places) == Some(*place)
     })
 }
 
 /// The one of three or more that is hardly likelier than not, or to have the right one among its rivals, where all others are. Where
 /// more than one is so unsure, all of them together may stand for something unknown.
 fn stand_in(places: &[Place]) -> Option<usize> {
-    let unsure = |place: &Place| {
-        let (own, others) = calibrated(place, &Doubts { others: places.len() - 1, ..Doubts::default() });
-        own + others.iter().sum::<f64>() < LIKELY
-    };
-    let mut unsure = (0..places.len()).filter(|place| unsure(&places[*place]));
+    let mut unsure = (0..places.len()).filter(|place| sure(places, *place) < LIKELY);
     unsure.next().filter(|_| places.len() > 2 && unsure.next().is_none())
+}
+
+/// How likely it is that one of several is right, or has the right one among its rivals.
+fn sure(places: &[Place], place: usize) -> f64 {
+    let (own, others) = calibrated(&places[place], &Doubts { others: places.len() - 1, ..Doubts::default() });
+    own + others.iter().sum::<f64>()
 }
 
 /// Puts rivals that do better in the place of what was selected, until none does.
