@@ -13,17 +13,18 @@ pub struct Records {
     path: PathBuf,
     table: Option<String>,
     keys: Vec<String>,
-    numbers: HashMap<String, u32>,
-    rows: Vec<Row>,
+    numbers: HashMap<String, usize>,
+    /// All values, one after the other: a text of its own for each would be most of what a long log takes.
+    texts: String,
+    /// Where the values of each key are, row by row, as far as there is any.
+    columns: Vec<Vec<Cell>>,
+    /// The rows in the file, from 1.
+    rows: Vec<usize>,
     unread: Vec<Unread>,
 }
 
-#[derive(Debug, Clone)]
-struct Row {
-    number: usize,
-    /// Key and value, sorted by the number of the key.
-    cells: Vec<(u32, Box<str>)>,
-}
+/// Where a value begins and ends among the texts; none where they are the same, for an empty one is no value.
+type Cell = (usize, usize);
 
 /// A record that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,7 +41,7 @@ pub struct Unread {
 #[derive(Debug, Clone, Copy)]
 pub struct Record<'a> {
     of: &'a Records,
-    row: &'a Row,
+    place: usize,
 }
 
 impl Records {
@@ -52,12 +53,27 @@ impl Records {
 
     /// Adds a record: its row in the file, from 1, and its keys with their values. Of a key that is there twice the last counts.
     pub fn push(&mut self, number: usize, cells: impl IntoIterator<Item = (impl AsRef<str>, String)>) {
-        let mut row: Vec<(u32, Box<str>)> =
-            cells.into_iter().map(|(key, value)| (self.number(key.as_ref()), value.into_boxed_str())).collect();
-        row.reverse();
-        row.sort_by_key(|(key, _)| *key);
-        row.dedup_by_key(|(key, _)| *key);
-        self.rows.push(Row { number, cells: row });
+        let place = self.rows.len();
+        self.rows.push(number);
+        for (key, value) in cells {
+            let key = self.number(key.as_ref());
+            self.put(key, place, &value);
+        }
+    }
+
+    /// Sets the value of the key of that number in the newest row, or in one for which that key has none yet.
+    fn put(&mut self, key: usize, place: usize, value: &str) {
+        let column = &mut self.columns[key];
+        column.truncate(place);
+        // What is the same row after row is kept once.
+        let same = column.last().copied().filter(|(from, to)| self.texts[*from..*to] == *value);
+        column.resize(place, (0, 0));
+        let cell = same.unwrap_or_else(|| {
+            let from = self.texts.len();
+            self.texts.push_str(value);
+            (from, self.texts.len())
+        });
+        column.push(cell);
     }
 
     /// Adds a record that cannot be read.
@@ -70,12 +86,13 @@ impl Records {
         self.number(key);
     }
 
-    fn number(&mut self, key: &str) -> u32 {
+    fn number(&mut self, key: &str) -> usize {
         if let Some(number) = self.numbers.get(key) {
             return *number;
         }
-        let number = u32::try_from(self.keys.len()).unwrap_or(u32::MAX);
+        let number = self.keys.len();
         self.keys.push(key.to_owned());
+        self.columns.push(Vec::new());
         self.numbers.insert(key.to_owned(), number);
         number
     }
@@ -121,7 +138,7 @@ impl Records {
 
     /// The records, in the order of the file.
     pub fn iter(&self) -> impl Iterator<Item = Record<'_>> {
-        self.rows.iter().map(|row| Record { of: self, row })
+        (0..self.rows.len()).map(|place| Record { of: self, place })
     }
 
     /// How many there are.
@@ -146,14 +163,21 @@ impl Records {
     /// as lists, are left out.
     #[must_use]
     pub fn of_table(table: &Table) -> Self {
-        let texts = |name| Some((name, table.texts(name).ok().or_else(|| table.time_texts(name))?));
-        let mut columns: Vec<(&str, Vec<Option<String>>)> = table.names().into_iter().filter_map(texts).collect();
         let mut records = Self::new(table.path(), None);
-        columns.iter().for_each(|(name, _)| records.declare(name));
-        for row in 0..table.rows() {
-            let Place::Row(number) = table.place(row) else { continue };
-            let cells = columns.iter_mut().filter_map(|(name, texts)| Some((*name, texts.get_mut(row)?.take()?)));
-            records.push(number, cells.collect::<Vec<_>>());
+        let placed = |row| match table.place(row) {
+            Place::Row(number) => Some((row, number)),
+            _ => None,
+        };
+        let rows: Vec<(usize, usize)> = (0..table.rows()).filter_map(placed).collect();
+        records.rows = rows.iter().map(|(_, number)| *number).collect();
+        for name in table.names() {
+            let Some(texts) = table.texts(name).ok().or_else(|| table.time_texts(name)) else { continue };
+            let key = records.number(name);
+            for (place, (row, _)) in rows.iter().enumerate() {
+                if let Some(value) = texts.get(*row).and_then(Option::as_deref) {
+                    records.put(key, place, value);
+                }
+            }
         }
         records
     }
@@ -163,15 +187,14 @@ impl<'a> Record<'a> {
     /// The value of a key; none where the record has none, or an empty one.
     #[must_use]
     pub fn get(&self, key: &str) -> Option<&'a str> {
-        let number = *self.of.numbers.get(key)?;
-        let at = self.row.cells.binary_search_by_key(&number, |(key, _)| *key).ok()?;
-        self.row.cells.get(at).map(|(_, value)| value.trim()).filter(|value| !value.is_empty())
+        let (from, to) = *self.of.columns[*self.of.numbers.get(key)?].get(self.place)?;
+        Some(self.of.texts[from..to].trim()).filter(|value| !value.is_empty())
     }
 
     /// Its row in the file, from 1.
     #[must_use]
     pub fn row(&self) -> usize {
-        self.row.number
+        self.of.rows[self.place]
     }
 
     /// The records it is among.
@@ -214,5 +237,12 @@ mod tests {
         assert_eq!((second.get("a"), second.get("c"), second.get("d"), second.row()), (None, None, None, 7));
         assert!(records.has_all(&["a", "c"]) && !records.has("d"));
         assert_eq!(records.name(), "a.json: orders");
+        // What is the same again is the same, and what is missing in between stays so.
+        records.push(8, [("a", "2".to_owned()), ("b", "3".to_owned())]);
+        records.push(9, [("b", "3".to_owned()), ("a", "2".to_owned()), ("a", "4".to_owned())]);
+        let of = |key| records.iter().map(|row| row.get(key)).collect::<Vec<_>>();
+        assert_eq!(of("a"), [Some("2"), None, Some("2"), Some("4")]);
+        assert_eq!(of("b"), [Some("3"), None, Some("3"), Some("3")]);
+        assert_eq!(of("c"), [None; 4]);
     }
 }
