@@ -81,9 +81,14 @@ impl Reconcile {
         let file = self.run.as_ref().map(RunFile::read).transpose()?;
         let progress = screen.progress();
         progress.tell("reading logs", 0, 0);
-        let backtest = self.backtest.as_deref().map(backtest_log).transpose()?;
-        let paper = lives(&import(&self.paper, &settings)?).map_err(|error| too_large(&self.paper[0], &error))?;
-        let found = self.found(backtest, paper, file.as_ref(), &progress)?;
+        let backtest = || self.backtest.as_deref().map(backtest_log).transpose();
+        let paper = || lives(&import(&self.paper, &settings)?).map_err(|error| too_large(&self.paper[0], &error));
+        // Of two errors it is always the same one that is told.
+        let (backtest, paper) = rayon::join(backtest, paper);
+        let (backtest, paper) = (backtest?, paper?);
+        // Not beside them, though it might be: both are large while they are read.
+        let prepared = file.as_ref().map(prepare_run).transpose()?;
+        let found = self.found(backtest, paper, file.as_ref().zip(prepared.as_ref()), &progress)?;
         drop(progress);
         let checked = found.checked(&tolerance);
         self.tell(&found, &checked, overwrite, screen)?;
@@ -92,9 +97,9 @@ impl Reconcile {
 
     fn found(
         &self,
-        backtest: Option<Lives>,
+        mut backtest: Option<Lives>,
         mut paper: Lives,
-        file: Option<&RunFile>,
+        run: Option<(&RunFile, &PreparedRun)>,
         progress: &Progress,
     ) -> Result<Reconciliation, Stop> {
         let clock = backtest.as_ref().map(|own| clock_difference(&own.orders, &paper.orders));
@@ -104,27 +109,27 @@ impl Reconcile {
         }
         let fails = |error: MoneyError| Stop::from(too_large(&self.paper[0], &error));
         let seed = Seed(self.seed);
-        let Some(file) = file else {
+        let Some((file, prepared)) = run else {
             let backtest = &backtest.unwrap_or_default();
             let compared = Compared { backtest, paper: &paper, replayed: None, showing: None, seed };
             return reconcile(&compared).map_err(fails);
         };
-        let prepared = prepare_run(file)?;
         let symbols: Vec<&str> = prepared.backtest.instruments().iter().map(|i| i.symbol.as_str()).collect();
         check_symbols(file, &symbols, &paper)?;
-        let multipliers = multipliers(&prepared, &symbols);
+        let multipliers = multipliers(prepared, &symbols);
         let known = |life: &mut Life| life.multiplier = multipliers.get(life.symbol.as_str()).copied().unwrap_or_default();
-        paper.orders.iter_mut().for_each(known);
+        paper.orders.iter_mut().chain(backtest.iter_mut().flat_map(|own| &mut own.orders)).for_each(known);
         progress.tell("replaying", 0, 0);
-        let mut replayed = self.replayed(&prepared, file, &symbols, &paper)?;
+        let again = |log: &Lives| self.replayed(prepared, file, &symbols, log);
+        let differs = |log: &Lives| again(log).map(|own| own.differs_from(&log.orders));
+        let (replayed, differs) = rayon::join(|| again(&paper), || backtest.as_ref().map(differs).transpose());
+        let (mut replayed, differs) = (replayed?, differs?);
         let note =
             |note: &ReplayNote| format!("{} orders were not replayed: {} (first: {})", note.orders, note.why, note.first);
         paper.notes.extend(replayed.notes.iter().map(note));
         let backtest = match backtest {
             Some(mut backtest) => {
-                backtest.orders.iter_mut().for_each(known);
-                let own = self.replayed(&prepared, file, &symbols, &backtest)?;
-                backtest.notes.extend(own.differs_from(&backtest.orders));
+                backtest.notes.extend(differs.into_iter().flatten());
                 backtest
             }
             // Execution alone: of what was not replayed there is nothing to compare.
