@@ -46,3 +46,11 @@ fn a_stop_is_found_though_a_run_of_samples_is_lost() {
     let trial = tried(45, 41);
     assert_eq!(names(&trial), ["dropout", "end_stop"]);
 }
+
+/// A wider law is no mechanism of its own: sought beside the others it took the place of one of them, and a cubic stiffness was
+/// lost.
+#[test]
+fn a_wider_law_takes_no_other_mechanisms_place() {
+    let trial = tried(45, 48);
+    assert_eq!(names(&trial), ["cubic_stiffness", "eccentricity"]);
+}

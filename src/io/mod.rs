@@ -102,5 +102,5 @@ pub use time_format::{TimeFormat, TimeUnit};
 pub use trajectory::{Need, TIME_COLUMN, TrajectoryTable, read_trajectory};
 pub use twin_file::{AssumedPrice, Assumptions, ChannelEntry, TwinFile};
 pub use twin_mechanism::{ListedMechanism, listed_mechanism};
-pub use unit::{UnitMismatch, check_unit};
+pub use unit::{UnitMismatch, check_unit, unit_told};
 pub use xml::{read_xml, xml_records};

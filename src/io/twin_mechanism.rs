@@ -3,7 +3,7 @@
 use super::document::Document;
 use super::error::{InputError, hint_among};
 use super::quantity::{DEFAULT_UNCERTAINTY, MechanismEntry};
-use super::unit::check_unit;
+use super::unit::{check_unit, unit_told};
 use crate::sim2real::{Mechanism, Parameter, Plant, Registry};
 
 /// A mechanism, its form and its parameters.
@@ -66,7 +66,7 @@ pub fn listed_mechanism<P: Plant>(
         })?;
         if !(parameter.lower..=parameter.upper).contains(&quantity.value) {
             let error = document.error(&keys, format!("expected a value from {} to {}", parameter.lower, parameter.upper));
-            return Err(error.found(quantity.value).hint(format!("its unit is [{unit}]")));
+            return Err(error.found(quantity.value).hint(unit_told(&unit)));
         }
         parameter.nominal = quantity.value;
         parameter.prior = Some(quantity.std());

@@ -12,6 +12,12 @@ pub struct UnitMismatch {
     pub hint: String,
 }
 
+/// What unit values are expected in, for a hint.
+#[must_use]
+pub fn unit_told(unit: &str) -> String {
+    if unit.is_empty() { "it is a pure number".to_owned() } else { format!("its unit is [{unit}]") }
+}
+
 /// Holds a unit to be the one expected. It may be written with blanks, `*` or `·` between its factors and with `²` for
 /// `^2`; `1`, `-` and nothing at all are the unit of a pure number; no claim (`None`) passes.
 ///
@@ -64,6 +70,11 @@ fn normal(unit: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pure_number_is_told_as_one() {
+        assert_eq!([unit_told("N m"), unit_told("")], ["its unit is [N m]", "it is a pure number"]);
+    }
 
     #[test]
     fn spellings_of_one_unit_are_equal() {

@@ -13,7 +13,7 @@ use std::path::Path;
 use super::Commands;
 use crate::io::{
     ChannelEntry, ControllerEntry, ControllerKind, InputError, Need, Quantity, TIME_COLUMN, TrajectoryTable, TwinFile,
-    hint_among, listed_mechanism, read_trajectory,
+    hint_among, listed_mechanism, read_trajectory, unit_told,
 };
 use crate::sim2real::{Assembly, Measured, Parameter, Pid, Plant, Recording, Registry};
 
@@ -87,7 +87,7 @@ fn parameter(twin: &TwinFile, wanted: &Wanted) -> Result<Quantity, InputError> {
         _ => return Ok(quantity.clone()),
     };
     let error = twin.error(&["parameters", name], format!("expected a value of `{name}` {wrong}"));
-    Err(error.found(quantity.value).hint(format!("its unit is [{unit}]")))
+    Err(error.found(quantity.value).hint(unit_told(unit)))
 }
 
 /// The plant with the mechanisms that the twin lists.
