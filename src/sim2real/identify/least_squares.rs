@@ -135,6 +135,9 @@ pub fn fit_from<S: Simulator>(
     if starts.len() > 1 {
         descents.par_iter_mut().for_each(|d| d.run(steps));
     }
+    if effort == Effort::Brief {
+        descents.par_iter_mut().for_each(|d| d.run_while_falling(Effort::Thorough.steps()));
+    }
     match descents.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective)) {
         Some(best) => best.fit(),
         None => fit_smooth(problem, &problem.nominal(), free, state),
@@ -145,6 +148,9 @@ pub fn fit_from<S: Simulator>(
 const PROBE: usize = 3;
 /// A start that stands at most this much higher than the best is followed too.
 const NEAR: f64 = 1.05;
+
+/// A brief fit goes on while each step takes away at least this part of what is left: it has not come to what it can do.
+const FALLING: f64 = 0.1;
 
 /// A fit under way.
 struct Descent<'a, 'b, S: Simulator> {
@@ -157,6 +163,8 @@ struct Descent<'a, 'b, S: Simulator> {
     /// The same, priors of the parameters included.
     objective: f64,
     damping: f64,
+    /// The part of the objective that the last step took away.
+    fell: f64,
     ended: bool,
 }
 
@@ -167,7 +175,8 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let state = state.clone();
         let runs = problem.followed(&theta, &state, free);
         let evaluation = problem.projected(&runs, &state);
-        let mut descent = Self { problem, free, theta, state, evaluation, objective: 0.0, damping: DAMPING, ended: false };
+        let mut descent =
+            Self { problem, free, theta, state, evaluation, objective: 0.0, damping: DAMPING, fell: 0.0, ended: false };
         descent.temper(&runs);
         descent
     }
@@ -206,6 +215,16 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         }
     }
 
+    /// Makes at most `steps` more steps, and ends with the first that does not take away [`FALLING`] of what is left.
+    fn run_while_falling(&mut self, steps: usize) {
+        for _ in 0..steps {
+            if self.ended || self.fell < FALLING {
+                return;
+            }
+            self.step();
+        }
+    }
+
     /// One step: the best of several dampings, or none where more damping does not help either.
     fn step(&mut self) {
         let (information, gradient) = self.normal_equations();
@@ -223,7 +242,8 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             if let Some((k, value)) = best.filter(|(_, value)| *value < self.objective) {
                 let Some((theta, state)) = points.into_iter().nth(k) else { return };
                 // A step too small to matter needs no new derivatives.
-                let matters = value < self.objective * (1.0 - 0.1 * CONVERGED);
+                self.fell = 1.0 - value / self.objective;
+                let matters = self.fell > 0.1 * CONVERGED;
                 (self.theta, self.state) = (theta, state);
                 self.damping = (self.damping * SPREAD[k]).max(1e-9);
                 let runs = self.problem.followed(&self.theta, &self.state, self.free);
@@ -234,6 +254,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             }
             self.damping *= SPREAD[2] * SPREAD[2];
         }
+        self.fell = 0.0;
         self.ended = true;
     }
 
