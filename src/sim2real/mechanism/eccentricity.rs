@@ -46,6 +46,11 @@ where
         plant.channels().first().is_some_and(|channel| channel.unit == "rad")
     }
 
+    /// Over less than a turn two harmonics may be bent into whatever else a sensor does.
+    fn general(&self, form: usize) -> bool {
+        form == 1
+    }
+
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let waves = (0..thetas.lanes())
             .map(|lane| std::array::from_fn(|k| if k < thetas.parameters() { thetas.row(k)[lane] } else { 0.0 }))
