@@ -67,11 +67,15 @@ where
         for ((command, limit), sharpness) in commands.iter_mut().zip(&self.limits).zip(&self.sharpness) {
             let u = command.as_mut();
             if limit.is_finite() {
-                let bent = (1.0 + (*u / limit.max(1e-12)).abs().powf(*sharpness)).powf(-1.0 / sharpness);
-                *u *= bent;
+                *u = bent(*u, *limit, *sharpness);
             }
         }
     }
+}
+
+/// `u / (1 + |u / limit|^sharpness)^(1 / sharpness)`: `u` where it is small, `limit` where it is large.
+pub(super) fn bent(u: f64, limit: f64, sharpness: f64) -> f64 {
+    u * (1.0 + (u / limit.max(1e-12)).abs().powf(sharpness)).powf(-1.0 / sharpness)
 }
 
 #[derive(Clone)]
