@@ -38,7 +38,7 @@ const FEWEST_ROWS: usize = 50;
 const WORSE: f64 = 1.02;
 /// What is less likely than this to be the library's is not said to be.
 const HARDLY_THE_LIBRARY: f64 = 0.1;
-/// The same of what does not carry over to held-out data either.
+/// The same of a single name, and of what does not carry over to held-out data either.
 const LIKELIER_THAN_NOT: f64 = 0.5;
 /// A name less certain than this is ambiguous.
 const CERTAIN: f64 = 0.7;
@@ -258,7 +258,13 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
     }
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
     // What the fitted data leave no doubt of is right although its form does not carry over to others.
-    let doubtful = findings.sampled && library(effects) < if unseen { CERTAIN } else { HARDLY_THE_LIBRARY };
+    let least = match effects {
+        _ if unseen => CERTAIN,
+        // One name alone is right or it is not; of several each may be, with another of the others.
+        [_] => LIKELIER_THAN_NOT,
+        _ => HARDLY_THE_LIBRARY,
+    };
+    let doubtful = findings.sampled && library(effects) < least;
     let unexplained = left_over || findings.inexact;
     if doubtful || unexplained && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
         return Verdict::Unexplained;
