@@ -54,3 +54,29 @@ fn a_wider_law_takes_no_other_mechanisms_place() {
     let trial = tried(45, 48);
     assert_eq!(names(&trial), ["cubic_stiffness", "eccentricity"]);
 }
+
+/// A sensor that reads far too little: three steps of a fit were not enough to see it, and laws that fell faster took its place.
+#[test]
+fn a_fit_that_still_falls_fast_is_not_yet_compared() {
+    let trial = tried(1005, 117);
+    assert_eq!(names(&trial), ["rectification", "scale"]);
+    assert_eq!(trial.verdict, Verdict::Named);
+}
+
+/// A dead zone beside a friction six times its size: it explains a four-hundredth of all, and as much where it was not fitted.
+#[test]
+fn what_explains_little_is_named_where_it_carries_over() {
+    assert_eq!(names(&tried(45, 98)), ["dead_zone", "load_friction"]);
+}
+
+/// What the form of a thermal derating is off by was a stiffness of one recording, and none of the other.
+#[test]
+fn what_explains_little_of_one_recording_alone_is_not_named() {
+    assert_eq!(names(&tried(1006, 181)), ["thermal_derating"]);
+}
+
+/// The edge of a dead zone, a little rounder than soft, was named a saturation besides.
+#[test]
+fn a_dead_zone_may_have_any_edge() {
+    assert_eq!(names(&tried(1006, 48)), ["dead_zone", "quadratic_drag"]);
+}

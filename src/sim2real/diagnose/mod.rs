@@ -3,7 +3,8 @@
 //! One file a step, in this order: `evidence` divides the recordings and finds their `noise`; a `hypothesis` is the
 //! twin with mechanisms added, and the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
 //! by their signatures; `select` fits and compares sets of them, `weigh`ed by the evidence that `whiteness` counts, and `forms` finds
-//! for each the form that does best beside the others; `rivals` looks for other names, and `confidence` says how sure one is;
+//! for each the form that does best beside the others; `rivals` looks for other names, `carry_over` asks the one recording of
+//! what explains little in the other, and `confidence` says how sure one is;
 //! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out; `verdict`
 //! weighs it all, and `words` tells it. `gates` says how long steps of integration may be, and `recognize` sees what needs no
 //! fit. `locate` and `onset` say where and since when the twin is off, `activity` when what was named acted, and `experiment`
@@ -13,6 +14,7 @@
 mod activity;
 mod aspects;
 mod by_recording;
+mod carry_over;
 mod changes;
 mod confidence;
 mod diagnosis;

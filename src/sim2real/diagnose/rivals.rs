@@ -2,11 +2,12 @@
 
 use rayon::prelude::*;
 
+use super::carry_over::carries_over;
 use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::select::Selection;
-use super::weigh::{SHARE, completes, evidence, gain, lead, left_open, pursued, share};
+use super::weigh::{completes, evidence, gain, lead, left_open, pursued, share};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
@@ -34,7 +35,10 @@ pub(super) struct Place {
 /// Swaps tried at the most.
 const SWAPS: usize = 4;
 
-/// A further mechanism that explains little, and is no more likely than this beside its rivals, is not worth a name ...
+/// Less than this part of the first misfit is little: ...
+const LITTLE: f64 = 0.01;
+/// ... a further mechanism that explains little must do so where it was not fitted, and one that is no more likely than this beside
+/// its rivals is not worth a name ...
 const ANYBODYS: f64 = 0.5;
 /// ... where what is left without it has at most this many times the mean square of the noise.
 const HARDLY_LEFT: f64 = 2.0;
@@ -65,11 +69,17 @@ fn anybodys<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, places:
     let whole = &selection.selected;
     (0..places.len()).filter(|_| places.len() > 1).find(|place| {
         let less = &selection.without[*place];
-        let little = share(&selection.recalibrated, less, whole) < SHARE && less.within(HARDLY_LEFT);
+        let little = share(&selection.recalibrated, less, whole) < LITTLE;
+        let hardly_left = less.within(HARDLY_LEFT);
         let likely = by_evidence(&places[*place]).0;
         let contained = (0..places.len()).any(|other| about(other).contains.contains(&about(*place).name));
-        let of_another = contained && less.within(HARDLY_LEFT) && sure(places, *place) < LIKELY_BESIDE_ITS_LAW;
-        little && likely < ANYBODYS || likely < HARDLY_IT || of_another || stand_in(places) == Some(*place)
+        let of_another = contained && hardly_left && sure(places, *place) < LIKELY_BESIDE_ITS_LAW;
+        let sampled = inquiry.twin.clock() != Clock::Event;
+        little && hardly_left && likely < ANYBODYS
+            || likely < HARDLY_IT
+            || of_another
+            || stand_in(places) == Some(*place)
+            || little && sampled && !carries_over(inquiry, less, whole)
     })
 }
 

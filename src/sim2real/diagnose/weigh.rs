@@ -8,7 +8,7 @@ use crate::sim2real::{Clock, Parameter, Twin};
 
 /// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
 /// quite the form of the real thing, and what they leave looks like something else ...
-pub(super) const SHARE: f64 = 0.01;
+const SHARE: f64 = 0.002;
 const SHARE_OF_MORE: f64 = 0.03;
 /// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
 const COMPLETES: f64 = 0.8;
