@@ -55,9 +55,15 @@ fn a_wider_law_takes_no_other_mechanisms_place() {
     assert_eq!(names(&trial), ["cubic_stiffness", "eccentricity"]);
 }
 
-/// A sensor that reads far too little: three steps of a fit were not enough to see it, and laws that fell faster took its place.
+/// A weak saturation: three steps of a fit were not enough to see it, and laws that fall faster took its place.
 #[test]
 fn a_fit_that_still_falls_fast_is_not_yet_compared() {
+    assert_eq!(names(&tried(45, 69)), ["saturation"]);
+}
+
+/// A sensor that reads far too little and is wrong on one side: over less than a turn two harmonics of an eccentricity are that, too.
+#[test]
+fn two_harmonics_do_not_stand_for_whatever_a_sensor_does() {
     let trial = tried(1005, 117);
     assert_eq!(names(&trial), ["rectification", "scale"]);
     assert_eq!(trial.verdict, Verdict::Named);
