@@ -221,6 +221,17 @@ fn library(effects: &[Effect]) -> f64 {
     effects.iter().map(known).product()
 }
 
+/// How likely it must be at least that what was named is the library's; `unseen` is whether it fails on held-out data.
+fn least_likely(effects: &[Effect], unseen: bool) -> f64 {
+    match effects {
+        // What the fitted data leave no doubt of is right although its form does not carry over to others.
+        _ if unseen => CERTAIN,
+        // One name alone is right or it is not; of several each may be, with another of the others.
+        [_] => LIKELIER_THAN_NOT,
+        _ => HARDLY_THE_LIBRARY,
+    }
+}
+
 /// Whether what is left on held-out data stands far above the noise.
 fn far_off(fit: &ChannelFit) -> bool {
     fit.trued_rmse * fit.trued_rmse > FAR_ABOVE_THE_NOISE * fit.noise_floor * fit.noise_floor
@@ -257,14 +268,7 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
         };
     }
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
-    // What the fitted data leave no doubt of is right although its form does not carry over to others.
-    let least = match effects {
-        _ if unseen => CERTAIN,
-        // One name alone is right or it is not; of several each may be, with another of the others.
-        [_] => LIKELIER_THAN_NOT,
-        _ => HARDLY_THE_LIBRARY,
-    };
-    let doubtful = findings.sampled && library(effects) < least;
+    let doubtful = findings.sampled && library(effects) < least_likely(effects, unseen);
     let unexplained = left_over || findings.inexact;
     if doubtful || unexplained && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
         return Verdict::Unexplained;
@@ -362,6 +366,14 @@ mod tests {
         assert_eq!(library(&[effect(0.6, &[0.6])]), 1.0);
         assert!(library(&[effect(0.9, &[]), effect(0.3, &[]), effect(0.2, &[])]) < HARDLY_THE_LIBRARY);
         assert_eq!(library(&[]), 1.0);
+    }
+
+    #[test]
+    fn one_name_alone_must_be_likelier_than_not() {
+        let says = |effects: &[Effect], unseen: bool| library(effects) >= least_likely(effects, unseen);
+        assert!(!says(&[effect(0.4, &[])], false) && says(&[effect(0.4, &[0.2])], false), "its rivals count");
+        assert!(says(&[effect(0.4, &[]), effect(0.9, &[])], false), "of several, one may be right");
+        assert!(!says(&[effect(0.6, &[])], true) && says(&[effect(0.8, &[])], true), "what fails unseen must be certain");
     }
 
     #[test]
