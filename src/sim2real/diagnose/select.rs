@@ -330,7 +330,7 @@ fn chosen<T: Twin>(
     let whole: f64 = parent.misfits.iter().map(|m| m.count as f64).sum();
     let (benefit, always) = if parent.leaves_nothing() { (1.0, 0) } else { (BENEFIT_OF_DOUBT, ALWAYS_FITTED) };
     let doubt = (benefit * effective).min(whole.max(effective));
-    let needed = needed_share(first, parent);
+    let needed = needed_share(inquiry, first, parent);
     let hopeful = |score: f64| {
         let explained = score * score;
         -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && benefit * explained > needed

@@ -7,8 +7,10 @@ use crate::sim2real::identify::Effort;
 use crate::sim2real::{Clock, Parameter, Twin};
 
 /// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
-/// quite the form of the real thing, and what they leave looks like something else ...
+/// quite the form of the real thing, and what they leave looks like something else; a second of messages must explain more, for of
+/// these it is not asked whether it carries over ...
 const SHARE: f64 = 0.002;
+const SHARE_OF_ORDERS: f64 = 0.01;
 const SHARE_OF_MORE: f64 = 0.03;
 /// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
 const COMPLETES: f64 = 0.8;
@@ -145,12 +147,12 @@ pub(super) fn plausibility<T: Twin>(inquiry: &Inquiry<'_, T>, values: &[f64]) ->
 }
 
 /// The least part of the parent's residual that a further mechanism has to explain to be needed.
-pub(super) fn needed_share<T>(first: &Hypothesis<T>, parent: &Hypothesis<T>) -> f64 {
+pub(super) fn needed_share<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, parent: &Hypothesis<T>) -> f64 {
     if parent.added.is_empty() {
         return 0.0;
     }
     let least = |(first, left): (&ChannelMisfit, &ChannelMisfit)| {
-        let most = (share_of(parent.added.len() + 1) * above_noise(first, left.level))
+        let most = (share_of(inquiry, parent.added.len() + 1) * above_noise(first, left.level))
             .min(COMPLETES * above_noise(left, left.level));
         most / left.sum_of_squares.max(1e-300)
     };
@@ -158,8 +160,12 @@ pub(super) fn needed_share<T>(first: &Hypothesis<T>, parent: &Hypothesis<T>) -> 
 }
 
 /// The part of the first misfit that the last of so many mechanisms must explain.
-fn share_of(mechanisms: usize) -> f64 {
-    if mechanisms > 2 { SHARE_OF_MORE } else { SHARE }
+fn share_of<T: Twin>(inquiry: &Inquiry<'_, T>, mechanisms: usize) -> f64 {
+    match inquiry.twin.clock() {
+        _ if mechanisms > 2 => SHARE_OF_MORE,
+        Clock::Event => SHARE_OF_ORDERS,
+        Clock::Sampled { .. } => SHARE,
+    }
 }
 
 /// Whether `better` explains nearly all that `other` leaves above noise as white as what `better` leaves.
@@ -205,7 +211,7 @@ pub(super) fn needed<T: Twin>(
             let explained = less.sum_of_squares - last.sum_of_squares;
             let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
             let noise_alone = less.like_noise() && explained < MORE_THAN_NOISE * less.sum_of_squares;
-            explained >= share_of(whole.added.len()) * all || !noise_alone && explained >= COMPLETES * left
+            explained >= share_of(inquiry, whole.added.len()) * all || !noise_alone && explained >= COMPLETES * left
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let change = || (0..rows).map(|i| less.fit.residual[i] - whole.fit.residual[i]);
