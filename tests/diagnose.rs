@@ -6,7 +6,7 @@ use rayon::ThreadPoolBuilder;
 use trueup::conceal::servo::{Excitation, Servo, ServoEffect};
 use trueup::conceal::{Column, Table};
 use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
-use trueup::sim2real::diagnose::{Effect, Outcome, Verdict, calibrate, diagnose};
+use trueup::sim2real::diagnose::{Effect, Evidence, Outcome, Verdict, calibrate, diagnose};
 use trueup::sim2real::{Assembly, Measured, Recording, Seed};
 
 fn column(table: &Table, name: &str) -> Vec<f64> {
@@ -208,4 +208,19 @@ fn a_calibration_finds_the_parameters_behind_a_recording() {
         let (value, std) = (calibration.values[k], calibration.std[k]);
         assert!((value - expected).abs() < 4.0 * std + 0.01 * expected, "{k}: {value} +- {std}, not {expected}");
     }
+}
+
+/// A joint that hardly slows down forgets its velocity later than the recording ends: windows of two such times would be the
+/// recording itself, and all would be sought twice in the same errors.
+#[test]
+fn windows_that_cut_nothing_are_not_followed() {
+    let recordings = [recording(&[], Excitation::SinesAndSteps, 111, 3_000)];
+    let window = |friction: f64| {
+        // Nothing draws it to one place.
+        let joint = Assembly::new(Joint::new(Axis::Rotary, [0.11, friction, 0.0, 1.0], [0.2, 0.2, 0.0, 0.0]), MECHANISMS);
+        Evidence::divide(&joint, &recordings, &[]).window
+    };
+    let short = window(0.25).unwrap();
+    assert!((0.3..2.0).contains(&short), "{short}");
+    assert_eq!(window(0.005), None);
 }

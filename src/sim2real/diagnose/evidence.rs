@@ -16,6 +16,9 @@ const WINDOW: f64 = 2.0;
 /// Windows into which a recording is cut at the most: each has an initial state of its own to be paid for.
 const MOST_WINDOWS: f64 = 40.0;
 
+/// A window longer than this part of a recording starts afresh so seldom that it shows what a free run shows.
+const LONGEST_WINDOW: f64 = 0.5;
+
 /// Rows of each held-out recording, as a part of it, from which its initial state is estimated.
 const SETTLING: f64 = 0.1;
 
@@ -130,7 +133,8 @@ pub fn settled<S: Simulator>(
 }
 
 /// How long windows must be [s] for a plant that never forgets where it started: there, a free run adds up all errors
-/// and its residuals hold hardly any independent evidence. None for a plant that forgets.
+/// and its residuals hold hardly any independent evidence. None for a plant that forgets, nor where windows would be no shorter
+/// than what was recorded.
 fn window<S: Simulator>(simulator: &S, parts: &[Part<'_, S::Stimulus>]) -> Option<f64> {
     if simulator.clock() == Clock::Event {
         return None;
@@ -163,5 +167,6 @@ fn window<S: Simulator>(simulator: &S, parts: &[Part<'_, S::Stimulus>]) -> Optio
     let row = (0..=last).find(|row| distance(initial.len(), *row) >= reach)?;
     let constant = time[row] - time[0];
     let duration = time[last] - time[0];
-    Some((WINDOW * constant).max(20.0 * duration / last.max(1) as f64).max(duration / MOST_WINDOWS))
+    let window = (WINDOW * constant).max(20.0 * duration / last.max(1) as f64).max(duration / MOST_WINDOWS);
+    (window <= LONGEST_WINDOW * duration).then_some(window)
 }

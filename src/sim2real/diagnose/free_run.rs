@@ -11,6 +11,8 @@ use crate::sim2real::Twin;
 const NEAR_BEST: usize = 8;
 /// What leaves this many times as much in free run as what it builds on is not an explanation, however well it fits windows.
 const STRAYS: f64 = 1.5;
+/// A free run that leaves no more than so many times the noise knows what windows may have missed.
+const HARDLY_MORE: f64 = 2.0;
 
 /// Puts first, of the hypotheses that come near the best and are no longer, the one that does best in free run, where windows
 /// were compared; what goes astray there beside `parent`, on which all build, is left out.
@@ -59,10 +61,11 @@ pub(super) fn strays<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, wh
 }
 
 /// Whether what was selected on windows does so much worse in free run than what was selected there, that it cannot be what is
-/// missing.
+/// missing: it does not leave mere noise of windows, or what was selected in free run hardly leaves more than noise itself.
 pub(super) fn worse_than<T: Twin>(windows: (&Inquiry<'_, T>, &Selection<T>), free_run: &Selection<T>) -> bool {
     let (inquiry, selection) = windows;
     let left = inquiry.left_in_free_run(&selection.selected);
     let least = free_run.selected.fit.objective();
-    !selection.complete() && !free_run.selected.added.is_empty() && left.is_some_and(|left| left > STRAYS * least)
+    let in_doubt = !selection.complete() || free_run.selected.within(HARDLY_MORE);
+    in_doubt && !free_run.selected.added.is_empty() && left.is_some_and(|left| left > STRAYS * least)
 }
