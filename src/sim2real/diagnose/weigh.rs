@@ -152,7 +152,7 @@ pub(super) fn needed_share<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis
         return 0.0;
     }
     let least = |(first, left): (&ChannelMisfit, &ChannelMisfit)| {
-        let most = (share_of(inquiry, parent.added.len() + 1) * above_noise(first, left.level))
+        let most = (share_of(inquiry.twin.clock(), parent.added.len() + 1) * above_noise(first, left.level))
             .min(COMPLETES * above_noise(left, left.level));
         most / left.sum_of_squares.max(1e-300)
     };
@@ -160,8 +160,8 @@ pub(super) fn needed_share<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis
 }
 
 /// The part of the first misfit that the last of so many mechanisms must explain.
-fn share_of<T: Twin>(inquiry: &Inquiry<'_, T>, mechanisms: usize) -> f64 {
-    match inquiry.twin.clock() {
+fn share_of(clock: Clock, mechanisms: usize) -> f64 {
+    match clock {
         _ if mechanisms > 2 => SHARE_OF_MORE,
         Clock::Event => SHARE_OF_ORDERS,
         Clock::Sampled { .. } => SHARE,
@@ -211,7 +211,8 @@ pub(super) fn needed<T: Twin>(
             let explained = less.sum_of_squares - last.sum_of_squares;
             let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
             let noise_alone = less.like_noise() && explained < MORE_THAN_NOISE * less.sum_of_squares;
-            explained >= share_of(inquiry, whole.added.len()) * all || !noise_alone && explained >= COMPLETES * left
+            explained >= share_of(inquiry.twin.clock(), whole.added.len()) * all
+                || !noise_alone && explained >= COMPLETES * left
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let change = || (0..rows).map(|i| less.fit.residual[i] - whole.fit.residual[i]);
@@ -308,6 +309,14 @@ mod tests {
         assert!(std::ptr::eq(scale_of(&leaving(1.2, 4_500.0), &white), &raw const white));
         let less_white = leaving(1.2, 3_500.0);
         assert!(std::ptr::eq(scale_of(&less_white, &white), &raw const less_white), "of many the number is known well");
+    }
+
+    #[test]
+    fn a_second_of_messages_must_explain_more_than_one_of_samples_and_a_third_most() {
+        let sampled = Clock::Sampled { longest_step: 0.01 };
+        assert!(share_of(Clock::Event, 2) > 2.0 * share_of(sampled, 2), "it is not asked whether it carries over");
+        assert!(share_of(sampled, 3) > share_of(Clock::Event, 2));
+        assert!((share_of(Clock::Event, 3) - share_of(sampled, 3)).abs() < f64::EPSILON);
     }
 
     #[test]
