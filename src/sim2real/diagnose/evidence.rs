@@ -133,8 +133,8 @@ pub fn settled<S: Simulator>(
 }
 
 /// How long windows must be [s] for a plant that never forgets where it started: there, a free run adds up all errors
-/// and its residuals hold hardly any independent evidence. None for a plant that forgets, nor where windows would be no shorter
-/// than what was recorded.
+/// and its residuals hold hardly any independent evidence. None for a plant that forgets, nor where windows would be longer
+/// than [`LONGEST_WINDOW`] of what was recorded.
 fn window<S: Simulator>(simulator: &S, parts: &[Part<'_, S::Stimulus>]) -> Option<f64> {
     if simulator.clock() == Clock::Event {
         return None;
