@@ -8,13 +8,14 @@ use std::sync::Arc;
 
 use chrono::{DateTime, NaiveDateTime};
 use polars::prelude::{
-    ArrowDataType, ArrowSchema, DataFrame, DataType, FileMetadata, IdxSize, IpcReader, ParquetReader, PolarsResult,
+    ArrowDataType, ArrowSchema, DataFrame, DataType, FileMetadata, IpcReader, ParquetReader, PolarsResult,
     SerReader, Series, TimeUnit as PolarsUnit, TimeZone, polars_ensure,
 };
 
 use super::arrow_buffers::buffers_agree;
 use super::error::InputError;
 use super::parquet_pages::{footer_agrees, pages_agree};
+use super::table::Rows;
 
 /// The values of one column, in the few types that recordings are made of.
 pub(super) enum Column {
@@ -68,13 +69,17 @@ impl ColumnarFile {
         self.frame.height()
     }
 
-    /// The values of the column of that name, which the file must have, in all of its rows or in those `only`.
-    pub(super) fn column(&self, name: &str, only: Option<&[IdxSize]>) -> Column {
+    /// The values of the column of that name, which the file must have, in those `rows`.
+    pub(super) fn column(&self, name: &str, rows: &Rows) -> Column {
         if let Some((_, kind)) = self.left_out.iter().find(|(left_out, _)| left_out == name) {
             return Column::Other(kind.clone());
         }
         let series = self.frame.column(name).map(|column| column.as_materialized_series());
-        let of_rows = series.and_then(|series| only.map_or(Ok(series.clone()), |only| series.take_slice(only)));
+        let of_rows = series.and_then(|series| match rows {
+            Rows::All => Ok(series.clone()),
+            Rows::Span(first, end) => Ok(series.slice(*first as i64, end - first)),
+            Rows::Chosen(rows) => series.take_slice(rows),
+        });
         match of_rows.and_then(|series| values(&series)) {
             Ok(column) => column,
             Err(error) => Column::Other(first_line(&error.to_string())),

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::io::{FeedFormat, Increase, InputError, Layout, OnBad, Table, TableChunks, check_increasing, common_spacing};
 use crate::sim2real::Timestamp;
 
-use super::stream::{BarRows, bars_of};
+use super::stream::{BarRows, PIECE, bars_of};
 use super::{Bar, DataNotes, FileStream, History, HistoryError, Quotes, Side};
 
 /// The columns of a file of bars.
@@ -132,21 +132,23 @@ pub(super) fn bars(table: &Table, format: &FeedFormat, interval: Option<i64>) ->
 /// The times of bars, without those that do not increase: whether there may be such is for the reader of the bars to say.
 fn increasing_times(table: &Table, format: &FeedFormat) -> Result<Vec<Timestamp>, InputError> {
     let column = BarRows::time_column(format);
-    let times = match format.rules.on_bad {
-        OnBad::Refuse => {
-            let times = table.times(column, &format.time)?;
-            check_increasing(table, column, &times, Increase::Strictly)?;
-            return Ok(times);
-        }
-        OnBad::Drop => table.times_with_holes(column, &format.time)?,
-    };
-    let mut increasing: Vec<Timestamp> = Vec::with_capacity(times.len());
-    for time in times.into_iter().flatten() {
-        if increasing.last().is_none_or(|last| *last < time) {
-            increasing.push(time);
+    let mut times: Vec<Timestamp> = Vec::with_capacity(table.rows());
+    for piece in table.pieces(PIECE) {
+        match format.rules.on_bad {
+            OnBad::Refuse => times.extend(piece.times(column, &format.time)?),
+            OnBad::Drop => {
+                for time in piece.times_with_holes(column, &format.time)?.into_iter().flatten() {
+                    if times.last().is_none_or(|last| *last < time) {
+                        times.push(time);
+                    }
+                }
+            }
         }
     }
-    Ok(increasing)
+    if format.rules.on_bad == OnBad::Refuse {
+        check_increasing(table, column, &times, Increase::Strictly)?;
+    }
+    Ok(times)
 }
 
 /// The error at its place in the file, in the file's own unit.

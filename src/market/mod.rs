@@ -179,7 +179,7 @@ pub use run::{PreparedRun, explained, prepare_run};
 #[cfg(feature = "io")]
 pub use run_as_twin::settle_trued_run;
 #[cfg(feature = "io")]
-pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
+pub use run_log::{InputFile, OutputError, Provenance, RunBrief, RunOutputs, RunSummary};
 #[cfg(feature = "io")]
 pub use run_stream::prepare_streaming_run;
 pub use session::Session;

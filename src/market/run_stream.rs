@@ -26,7 +26,7 @@ pub fn prepare_streaming_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     let beside = Beside::read(run)?;
     let settings = settings(run, &begun, &beside)?;
     let backtest = Backtest::streaming(instruments, venue, settings).map_err(|error| super::explained(run, &error))?;
-    let provenance = provenance(run, &backtest, beside.inputs(run, &[])?)?;
+    let provenance = provenance(run, &backtest, beside.inputs(run)?)?;
     Ok(PreparedRun { provenance, backtest, streamed: Some(Box::new(run.clone())), beside })
 }
 

@@ -44,7 +44,7 @@ pub(super) use between::Between;
 #[cfg(feature = "io")]
 pub use file_stream::FileStream;
 #[cfg(feature = "io")]
-pub(super) use file_stream::bars_of;
+pub(super) use file_stream::{PIECE, bars_of};
 pub use order_step::{Departure, NumberedPrint, OrderStep};
 pub use stored::Stored;
 #[cfg(feature = "io")]

@@ -52,19 +52,22 @@ impl Session {
         // What is held is charged at the first event of a day.
         let day = if self.venue.charges.is_empty() { Timestamp::MAX } else { self.carry.next };
         let (end, most) = (others.min(due).min(shown).min(day), last.saturating_sub(self.held.events));
-        let mut passed = 0;
-        let mut asked = Ok(false);
+        let (mut passed, mut shown) = (0, Ok(()));
         for bar in bars[next..].iter().take(most).take_while(|bar| bar.known_at < end) {
             passed += 1;
-            asked = self.show_bar(instrument, bar, strategy);
-            if !matches!(asked, Ok(false)) {
-                break;
+            match self.show_bar(instrument, bar, strategy) {
+                Ok(false) => {}
+                Ok(true) => break,
+                Err(error) => {
+                    shown = Err(error);
+                    break;
+                }
             }
         }
         if passed > 0 {
             self.rows += passed;
             self.feed.skip_bars(passed);
         }
-        asked.map(|_| ())
+        shown
     }
 }

@@ -124,18 +124,24 @@ impl<T: Dated + Clone + PartialEq> Kept<T> {
     /// Gives out the rows before which none can come any more; at the `end` all that are left.
     pub(super) fn give(&mut self, end: bool, into: &mut dyn FnMut(T)) {
         while let Some(row) = self.sequence.pop(end) {
-            if let Some(before) = &self.last {
-                if row.time() < before.time() {
-                    self.notes.found(Finding::ClockBack);
-                }
-                if row == *before {
-                    self.notes.found(Finding::Repeated);
-                }
-            }
-            self.notes.gave(row.known_at(), self.max_gap);
-            self.last = Some(row.clone());
-            into(row);
+            self.give_one(row, into);
         }
+    }
+
+    /// Gives out the next row.
+    #[inline]
+    fn give_one(&mut self, row: T, into: &mut dyn FnMut(T)) {
+        if let Some(before) = &self.last {
+            if row.time() < before.time() {
+                self.notes.found(Finding::ClockBack);
+            }
+            if row == *before {
+                self.notes.found(Finding::Repeated);
+            }
+        }
+        self.notes.gave(row.known_at(), self.max_gap);
+        self.last = Some(row.clone());
+        into(row);
     }
 }
 
@@ -160,6 +166,11 @@ impl<T: Dated + Clone + PartialEq> Emit<'_, T> {
     /// Takes what came of data row `row` of the table.
     pub(super) fn push(&mut self, row: usize, item: T) -> Result<(), InputError> {
         let known_at = item.known_at();
+        if self.rows.sequence.passes(known_at) {
+            self.rows.newest_at = self.table.place(row);
+            self.rows.give_one(item, self.into);
+            return Ok(());
+        }
         let newest = self.rows.sequence.newest();
         match self.rows.sequence.push(item) {
             Placed::Last => self.rows.newest_at = self.table.place(row),

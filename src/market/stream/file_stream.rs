@@ -158,6 +158,9 @@ impl FileStream<Known<Book>> {
     }
 }
 
+/// Rows of a table in memory that are decoded at once: their columns fit into the cache of a core.
+pub(in crate::market) const PIECE: usize = 1 << 12;
+
 /// The bars of a table that is in memory as a whole.
 pub(in crate::market) fn bars_of(
     table: &Table,
@@ -169,7 +172,9 @@ pub(in crate::market) fn bars_of(
     let mut kept = Kept::new(DataNotes::of(FeedKind::Bars.word()), rules.on_bad, None, rules.max_gap);
     let mut bars = Vec::with_capacity(table.rows());
     let order_column = BarRows::time_column(format);
-    decode(table, &mut reader, order_column, &mut kept, &mut |bar| bars.push(bar))?;
+    for piece in table.pieces(PIECE) {
+        decode(&piece, &mut reader, order_column, &mut kept, &mut |bar| bars.push(bar))?;
+    }
     finish(&mut reader, &mut kept, (rules.until, rules.max_gap), &mut |bar| bars.push(bar));
     Ok((bars, kept.notes))
 }
