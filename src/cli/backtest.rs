@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::io::{InputError, OutputFolder, Overwrite, RunFile, hint_among};
-use crate::market::{Instrument, RunBrief, RunOutputs, Strategy, prepare_run, prepare_streaming_run};
+use crate::market::{Instrument, RunBrief, RunOutputs, Strategy, prepare_run, prepare_streaming_run, streams_as_well};
 use crate::report::Metric;
 use crate::report::quantity::UNDEFINED;
 use crate::strategies::{self, StrategyError};
@@ -64,7 +64,9 @@ impl Run {
             draws::check(&file)?;
         }
         self.turn.check_free(overwrite)?;
-        let prepared = if file.run.stream { prepare_streaming_run(&file)? } else { prepare_run(&file)? };
+        // What goes through its data once need not hold them, where to read them twice costs next to nothing.
+        let once = self.draws.is_none() && self.turn.is_none() && streams_as_well(&file);
+        let prepared = if file.run.stream || once { prepare_streaming_run(&file)? } else { prepare_run(&file)? };
         let progress = screen.progress();
         let going = Going { file: &file, prepared: &prepared, progress: &progress, strategy: &|| strategy(&file) };
         let (record, beside) = match self.turn.run(&going, overwrite)? {

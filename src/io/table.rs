@@ -78,11 +78,20 @@ impl Table {
     /// # Errors
     /// As [`read_with`](Self::read_with), but for that.
     pub fn read_even_empty(path: impl AsRef<Path>, renames: &Renames) -> Result<Self, InputError> {
-        let path = path.as_ref();
+        Self::read_columns(path.as_ref(), renames, None)
+    }
+
+    /// As [`read_even_empty`](Self::read_even_empty), of a columnar file no more than the columns `only`, where any are given: they
+    /// may be asked for, and no others.
+    pub(crate) fn read_columns(path: &Path, renames: &Renames, only: Option<&[&str]>) -> Result<Self, InputError> {
+        let own = |name: &&str| renames.get(*name).cloned().unwrap_or_else(|| (*name).to_owned());
+        let only: Option<Vec<String>> = only.map(|only| only.iter().map(own).collect());
         let body = match Ending::of(path)? {
             Ending::Csv => Body::Csv(CsvText::first_block(path, bytes(path, open(path)?)?)?),
             Ending::CsvGz => Body::Csv(CsvText::first_block(path, unzip(path, open(path)?)?)?),
-            Ending::Columnar(container) => Body::Columnar(ColumnarFile::read(path, open(path)?, container)?),
+            Ending::Columnar(container) => {
+                Body::Columnar(ColumnarFile::read(path, open(path)?, container, only.as_deref())?)
+            }
         };
         let table = Self::of(path, renames, body, 0);
         table.check_columns()?;
@@ -367,7 +376,9 @@ impl Table {
             (Body::Csv(csv), Rows::Chosen(rows)) => {
                 Cells::Text(Box::new(rows.iter().map(move |row| csv.cell(*row as usize, index))))
             }
-            (Body::Csv(csv), _) => Cells::Text(Box::new((0..self.rows()).map(move |row| csv.cell(self.own_row(row), index)))),
+            (Body::Csv(csv), _) => {
+                Cells::Text(Box::new((0..self.rows()).map(move |row| csv.cell(self.own_row(row), index))))
+            }
             (Body::Columnar(file), rows) => match file.column(own, rows) {
                 // Some writers keep numbers as texts: they are read as a CSV's cells are.
                 Column::Texts(values) => {

@@ -28,6 +28,8 @@ mod print_rows;
 #[cfg(feature = "io")]
 mod quote_rows;
 #[cfg(feature = "io")]
+mod read_ahead;
+#[cfg(feature = "io")]
 mod sequence;
 mod stored;
 #[cfg(feature = "io")]
@@ -46,6 +48,8 @@ pub use file_stream::FileStream;
 #[cfg(feature = "io")]
 pub(super) use file_stream::{PIECE, bars_of};
 pub use order_step::{Departure, NumberedPrint, OrderStep};
+#[cfg(feature = "io")]
+pub(super) use read_ahead::ReadAhead;
 pub use stored::Stored;
 #[cfg(feature = "io")]
 pub(super) use table_rows::{TableRows, check_rows};

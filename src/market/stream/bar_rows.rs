@@ -34,6 +34,7 @@ impl BarRows {
     }
 
     /// The bar of a row, as long as the interval.
+    #[inline(always)]
     fn bar(&self, at: Timestamp, values: &[Vec<Option<f64>>; 5], row: usize) -> Result<Bar, Fault> {
         let [opens, highs, lows, closes, volumes] = values;
         let (open_at, known_at) = match self.stamp {
@@ -49,23 +50,27 @@ impl BarRows {
             close: price("close", closes, row, self.scale)?,
             volume: number("volume", volumes, row)?,
         };
-        check_bar(row, &bar).map_err(|error| Fault::broken(error, self.scale))?;
-        Ok(bar)
+        match check_bar(row, &bar) {
+            Ok(()) => Ok(bar),
+            Err(error) => Err(Fault::broken(error, self.scale)),
+        }
     }
 
     /// The time of a row, which comes after the one before.
+    #[inline(always)]
     fn time(&self, times: &[Option<Timestamp>], row: usize) -> Result<Timestamp, Fault> {
         let at = time(self.ts, times, row)?;
         match self.before {
-            Some((before, place)) if at <= before => {
-                let column = self.ts;
-                let finding = if at == before { Finding::Duplicate } else { Finding::Late };
-                Err(Fault::new(finding, move |table, row| {
-                    not_increasing(table, column, row, &at, (&before, place), Increase::Strictly)
-                }))
-            }
+            Some((before, place)) if at <= before => Err(self.not_after(at, before, place)),
             _ => Ok(at),
         }
+    }
+
+    #[cold]
+    fn not_after(&self, at: Timestamp, before: Timestamp, place: Place) -> Fault {
+        let column = self.ts;
+        let finding = if at == before { Finding::Duplicate } else { Finding::Late };
+        Fault::new(finding, move |table, row| not_increasing(table, column, row, &at, (&before, place), Increase::Strictly))
     }
 }
 
@@ -91,10 +96,15 @@ impl Decode<Bar> for BarRows {
                 held.known_at = held.known_at.min(at);
                 emit.push(held_at, held)?;
             }
-            match (bar, self.stamp) {
-                (Some(bar), Stamp::Open) => self.held = Some((row, bar)),
-                (Some(bar), Stamp::Close) => emit.push(row, bar)?,
-                (None, _) => {}
+            match (bar, self.stamp, times.get(row + 1)) {
+                // The one that ends it is at hand, as nearly always.
+                (Some(mut bar), Stamp::Open, Some(Some(next))) if *next > at => {
+                    bar.known_at = bar.known_at.min(*next);
+                    emit.push(row, bar)?;
+                }
+                (Some(bar), Stamp::Open, _) => self.held = Some((row, bar)),
+                (Some(bar), Stamp::Close, _) => emit.push(row, bar)?,
+                (None, ..) => {}
             }
         }
         Ok(())

@@ -48,6 +48,7 @@ impl Fault {
     }
 
     /// A cell of `column` without a value.
+    #[cold]
     pub(super) fn missing(column: &str, what: &'static str) -> Self {
         let column = column.to_owned();
         Self::new(Finding::Missing, move |table, row| table.missing(&column, row, what))
@@ -152,25 +153,36 @@ impl<T: Dated + Clone + PartialEq> Emit<'_, T> {
     }
 
     /// The value, if there is one: a fault is an error or counted, as the policy has it.
+    #[inline(always)]
     pub(super) fn sound<V>(&mut self, row: usize, value: Result<V, Fault>) -> Result<Option<V>, InputError> {
         match value {
             Ok(value) => Ok(Some(value)),
-            Err(fault) if self.rows.on_bad == OnBad::Refuse => Err(fault.at(self.table, row)),
-            Err(fault) => {
-                self.rows.notes.found(fault.finding);
-                Ok(None)
-            }
+            Err(fault) => self.unsound(row, &fault).map(|()| None),
         }
     }
 
+    #[cold]
+    fn unsound(&mut self, row: usize, fault: &Fault) -> Result<(), InputError> {
+        if self.rows.on_bad == OnBad::Refuse {
+            return Err(fault.at(self.table, row));
+        }
+        self.rows.notes.found(fault.finding);
+        Ok(())
+    }
+
     /// Takes what came of data row `row` of the table.
+    #[inline(always)]
     pub(super) fn push(&mut self, row: usize, item: T) -> Result<(), InputError> {
-        let known_at = item.known_at();
-        if self.rows.sequence.passes(known_at) {
+        if self.rows.sequence.passes(item.known_at()) {
             self.rows.newest_at = self.table.place(row);
             self.rows.give_one(item, self.into);
             return Ok(());
         }
+        self.put_in_order(row, item)
+    }
+
+    fn put_in_order(&mut self, row: usize, item: T) -> Result<(), InputError> {
+        let known_at = item.known_at();
         let newest = self.rows.sequence.newest();
         match self.rows.sequence.push(item) {
             Placed::Last => self.rows.newest_at = self.table.place(row),
@@ -190,13 +202,23 @@ impl<T: Dated + Clone + PartialEq> Emit<'_, T> {
 }
 
 /// The number in a cell of a column that must be complete.
+#[inline(always)]
 pub(super) fn number(column: &str, values: &[Option<f64>], row: usize) -> Result<f64, Fault> {
     values.get(row).copied().flatten().ok_or_else(|| Fault::missing(column, "a number"))
 }
 
 /// The price in such a cell, in `scale` [currency]: above 0.
+#[inline(always)]
 pub(super) fn price(column: &str, values: &[Option<f64>], row: usize, scale: f64) -> Result<Price, Fault> {
     let value = number(column, values, row)?;
+    match Price::nearest(value * scale) {
+        Ok(price) if value > 0.0 => Ok(price),
+        _ => no_price(column, value, scale),
+    }
+}
+
+#[cold]
+fn no_price(column: &str, value: f64, scale: f64) -> Result<Price, Fault> {
     if value <= 0.0 {
         let hint = "drop the row, or name the column that holds the price in `columns`";
         return Err(Fault::cell(Finding::Price, column, "expected a price greater than 0", value, hint));
@@ -224,6 +246,7 @@ pub(super) fn size(column: &str, values: &[Option<f64>], row: usize, scale: f64)
 }
 
 /// The time in a cell of a column that must be complete.
+#[inline(always)]
 pub(super) fn time(column: &str, values: &[Option<Timestamp>], row: usize) -> Result<Timestamp, Fault> {
     values.get(row).copied().flatten().ok_or_else(|| Fault::missing(column, "a time"))
 }

@@ -37,7 +37,7 @@ impl<T: Dated> Sequence<T> {
 
     /// Whether a row that is known at `known_at` goes on at once, and is then the newest: nothing is held back, none may come before
     /// it, and it is not late. Nearly all rows are such.
-    #[inline]
+    #[inline(always)]
     pub(super) fn passes(&mut self, known_at: Timestamp) -> bool {
         let passes = self.window == 0 && known_at >= self.newest && self.held.is_empty();
         if passes {
@@ -98,7 +98,10 @@ mod tests {
             // What passes is what is put last and given out at once.
             let passed = other.passes(Timestamp(*row));
             given.extend(std::iter::from_fn(|| sequence.pop(false)).map(|row| row.0));
-            assert!(!passed || (placed.last(), &given[before..], other.newest) == (Some(&Placed::Last), &[*row], sequence.newest));
+            assert!(
+                !passed
+                    || (placed.last(), &given[before..], other.newest) == (Some(&Placed::Last), &[*row], sequence.newest)
+            );
             assert!(passed || window.is_some() || placed.last() == Some(&Placed::Late));
         }
         given.extend(std::iter::from_fn(|| sequence.pop(true)).map(|row| row.0));
