@@ -67,9 +67,17 @@ fn a_run_through_its_data_is_that_of_data_in_memory() {
         settings.insert("kind".to_owned(), file.strategy.clone().into());
         let record = prepared.backtest.run(strategies::build(&settings).unwrap().as_mut()).unwrap();
         let outputs = prepared.outputs(&record).unwrap();
-        let told: Value = serde_json::from_str(&outputs.json().unwrap()).unwrap();
+        // What lies behind its end is not read: that is all there is to tell them apart by.
+        let told = |mut summary: Value| {
+            if !changes.is_empty() {
+                summary.as_object_mut().unwrap().remove("data").unwrap();
+                summary["inputs"][1].as_object_mut().unwrap().remove("rows").unwrap();
+            }
+            summary
+        };
+        let whole = told(serde_json::from_str(&outputs.json().unwrap()).unwrap());
         for threads in [1, 2] {
-            assert_eq!(scene.json(&format!("backtest run.toml --threads {threads} --out a{threads}")), told);
+            assert_eq!(told(scene.json(&format!("backtest run.toml --threads {threads} --out a{threads}"))), whole);
             assert_eq!(Table::read(scene.path(&format!("a{threads}/equity.parquet"))).unwrap().rows(), record.equity.len());
         }
         let (code, text, _) = scene.run("backtest run.toml");

@@ -61,6 +61,7 @@ pub enum MoneyError {
 }
 
 /// `value` in whole 1e-9, to the nearest, half away from 0.
+#[inline]
 fn nanos(what: &'static str, value: f64) -> Result<i64, MoneyError> {
     const LIMIT: f64 = 9.2e9;
     if value.abs() <= LIMIT {

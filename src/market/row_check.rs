@@ -8,12 +8,15 @@ use super::{Bar, DepthAction, DepthChange, HistoryError, Level, OrderAction, Ord
 /// is 0 or more.
 #[inline(always)]
 pub(super) fn check_bar(row: usize, bar: &Bar) -> Result<(), HistoryError> {
+    if is_bar(bar) { Ok(()) } else { bar_fault(row, bar) }
+}
+
+/// Whether [`check_bar`] has nothing against a bar.
+#[inline(always)]
+pub(super) fn is_bar(bar: &Bar) -> bool {
     let within = |price: Price| bar.low <= price && price <= bar.high;
     let priced = bar.low.0 > 0 && within(bar.open) && within(bar.close);
-    if priced && bar.open_at < bar.known_at && (0.0..f64::INFINITY).contains(&bar.volume) {
-        return Ok(());
-    }
-    bar_fault(row, bar)
+    priced && bar.open_at < bar.known_at && (0.0..f64::INFINITY).contains(&bar.volume)
 }
 
 /// What [`check_bar`] has against a bar.

@@ -112,14 +112,23 @@ pub(in crate::market) struct Kept<T> {
     pub(super) max_gap: Option<i64>,
     pub(super) notes: DataNotes,
     pub(super) sequence: Sequence<T>,
-    /// Where the row stands that was known latest of all so far.
+    /// Where the row stands that was known latest of all so far: in a table before, or in the one at hand.
     newest_at: Place,
+    newest_row: Option<usize>,
     last: Option<T>,
 }
 
 impl<T: Dated + Clone + PartialEq> Kept<T> {
     pub(super) fn new(notes: DataNotes, on_bad: OnBad, reorder: Option<i64>, max_gap: Option<i64>) -> Self {
-        Self { on_bad, max_gap, notes, sequence: Sequence::new(reorder), newest_at: Place::File, last: None }
+        Self {
+            on_bad,
+            max_gap,
+            notes,
+            sequence: Sequence::new(reorder),
+            newest_at: Place::File,
+            newest_row: None,
+            last: None,
+        }
     }
 
     /// Gives out the rows before which none can come any more; at the `end` all that are left.
@@ -129,8 +138,15 @@ impl<T: Dated + Clone + PartialEq> Kept<T> {
         }
     }
 
+    /// `table` has been read: of its rows the place of the newest is kept.
+    pub(super) fn leave(&mut self, table: &Table) {
+        if let Some(row) = self.newest_row.take() {
+            self.newest_at = table.place(row);
+        }
+    }
+
     /// Gives out the next row.
-    #[inline]
+    #[inline(always)]
     fn give_one(&mut self, row: T, into: &mut dyn FnMut(T)) {
         if let Some(before) = &self.last {
             if row.time() < before.time() {
@@ -174,21 +190,27 @@ impl<T: Dated + Clone + PartialEq> Emit<'_, T> {
     #[inline(always)]
     pub(super) fn push(&mut self, row: usize, item: T) -> Result<(), InputError> {
         if self.rows.sequence.passes(item.known_at()) {
-            self.rows.newest_at = self.table.place(row);
+            self.rows.newest_row = Some(row);
             self.rows.give_one(item, self.into);
             return Ok(());
         }
         self.put_in_order(row, item)
     }
 
+    /// Takes what came of several data rows, each with its number.
+    pub(super) fn push_all(&mut self, rows: &[(usize, T)]) -> Result<(), InputError> {
+        rows.iter().try_for_each(|(row, item)| self.push(*row, item.clone()))
+    }
+
     fn put_in_order(&mut self, row: usize, item: T) -> Result<(), InputError> {
         let known_at = item.known_at();
         let newest = self.rows.sequence.newest();
         match self.rows.sequence.push(item) {
-            Placed::Last => self.rows.newest_at = self.table.place(row),
+            Placed::Last => self.rows.newest_row = Some(row),
             Placed::Between => self.rows.notes.found(Finding::Reordered),
             Placed::Late => {
-                let (column, before_at) = (self.order_column.to_owned(), self.rows.newest_at);
+                let newest_at = self.rows.newest_row.map_or(self.rows.newest_at, |row| self.table.place(row));
+                let (column, before_at) = (self.order_column.to_owned(), newest_at);
                 let late = move |table: &Table, row: usize| {
                     not_increasing(table, &column, row, &known_at, (&newest, before_at), Increase::OrStays)
                 };

@@ -131,7 +131,9 @@ pub(super) fn decode<T: Dated + Clone + PartialEq>(
     into: &mut dyn FnMut(T),
 ) -> Result<(), InputError> {
     rows.notes.read(table.rows() as u64);
-    decode.decode(table, &mut Emit { table, order_column, rows, into })
+    decode.decode(table, &mut Emit { table, order_column, rows, into })?;
+    rows.leave(table);
+    Ok(())
 }
 
 /// Gives out what was held back; `until` is the time up to which there should be data, beside the longest gap that is none [ns].
