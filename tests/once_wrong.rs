@@ -103,6 +103,8 @@ fn what_never_changes_is_told_before_what_changes_with_time() {
     let trial = tried(1007, 91);
     assert_eq!(names(&trial), ["constant_load"]);
     assert_eq!(trial.found[0].rivals.first().map(String::as_str), Some("drift"));
+    // Beside a payload that changes with time too.
+    assert_eq!(names(&tried(1003, 52)), ["constant_load", "payload_change"]);
 }
 
 /// An end stop that the fitted recording leaves no doubt of, and a held-out run that parts at a bounce, as the oracle's does.

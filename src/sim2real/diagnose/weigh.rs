@@ -1,5 +1,7 @@
 //! Weighing: what the evidence says of one hypothesis beside another.
 
+use std::cmp::Ordering;
+
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
@@ -97,20 +99,20 @@ pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: 
     // What says the same is told apart by its length alone.
     let said = match b.free() as f64 - a.free() as f64 {
         _ if !alike(inquiry, first, a, b) => evidence,
-        0.0 => match (ages(inquiry, a), ages(inquiry, b)) {
+        0.0 => match ageing(inquiry, a).cmp(&ageing(inquiry, b)) {
             // What is the same at all times explains more than what happens to change as if it were.
-            (true, false) => -INDIFFERENT,
-            (false, true) => INDIFFERENT,
-            _ => evidence.clamp(-INDIFFERENT, INDIFFERENT),
+            Ordering::Greater => -INDIFFERENT,
+            Ordering::Less => INDIFFERENT,
+            Ordering::Equal => evidence.clamp(-INDIFFERENT, INDIFFERENT),
         },
         longer => longer * (1.0 + least_left(a, b).misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln(),
     };
     said + by_own
 }
 
-/// Whether one of the laws of `hypothesis` is another one at another time.
-fn ages<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> bool {
-    hypothesis.added.iter().any(|number| inquiry.candidates[*number].ages)
+/// How many of the laws of `hypothesis` are others at other times.
+fn ageing<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> usize {
+    hypothesis.added.iter().filter(|number| inquiry.candidates[**number].ages).count()
 }
 
 /// The same by what they leave alone, also where that is alike.
