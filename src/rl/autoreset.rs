@@ -23,7 +23,7 @@ pub struct Finals<'a> {
     pub ended: &'a [bool],
     /// What was observed last, shape (lanes, size).
     pub observations: &'a [f32],
-    /// Info at the end, shape (channels, lanes).
+    /// Info at the end, shape (channels, lanes); nothing where it is [not kept](Autoreset::keep_info).
     pub info: &'a [f64],
 }
 
@@ -51,6 +51,14 @@ impl<E: VecEnv> Autoreset<E> {
             AutoresetMode::NextStep | AutoresetMode::Disabled => (0, 0),
         };
         Self { env, mode, over: vec![false; lanes], ended: false, observations: vec![0.0; rows], info: vec![0.0; channels] }
+    }
+
+    /// Whether the info of episodes that end is kept in [`Finals`], as it is from the beginning: to ask for it takes longer than many a
+    /// step, in all lanes whenever an episode ends in one.
+    pub fn keep_info(&mut self, keep: bool) {
+        let kept = keep && self.mode == AutoresetMode::SameStep;
+        let channels = if kept { self.env.about().info.len() } else { 0 };
+        self.info.resize(self.over.len() * channels, 0.0);
     }
 
     /// The environment.
@@ -133,11 +141,12 @@ impl<E: VecEnv> Autoreset<E> {
     }
 
     fn note_ends(&mut self, out: &Out<'_>) {
-        self.ended = false;
+        let mut ended = false;
         for ((over, terminated), truncated) in self.over.iter_mut().zip(&*out.terminated).zip(&*out.truncated) {
             *over = *terminated | *truncated;
-            self.ended |= *over;
+            ended |= *over;
         }
+        self.ended = ended;
     }
 
     fn keep_finals(&mut self, out: &Out<'_>) {
@@ -221,6 +230,22 @@ mod tests {
         let mut taken = [0.0; 2];
         env.env().info(0, &mut taken);
         assert_eq!(taken, [1.0, 4.0]);
+    }
+
+    #[test]
+    fn info_of_the_end_is_kept_or_not_as_is_asked_and_changes_nothing_else() {
+        let (mut env, mut buffers) = driven(AutoresetMode::SameStep);
+        let (mut other, mut others) = (env.clone(), buffers.clone());
+        other.keep_info(false);
+        (0..3).for_each(|number| assert_eq!(step(&mut env, &mut buffers, number), step(&mut other, &mut others, number)));
+        let (with, without) = (env.finals().unwrap(), other.finals().unwrap());
+        assert_eq!((with.ended, with.observations[0]), (without.ended, without.observations[0]));
+        assert_eq!((with.info, without.info), (&[3.0, 3.0][..], &[][..]));
+        other.keep_info(true);
+        (3..6).for_each(|number| {
+            step(&mut other, &mut others, number);
+        });
+        assert_eq!(other.finals().unwrap().info[0], 3.0);
     }
 
     #[test]

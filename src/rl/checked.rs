@@ -80,6 +80,11 @@ impl<E: VecEnv> Checked<E> {
         self.driver.finals()
     }
 
+    /// Whether info of episodes that end is kept in the [`finals`](Self::finals), as it is from the beginning.
+    pub fn keep_info(&mut self, keep: bool) {
+        self.driver.keep_info(keep);
+    }
+
     /// Begins an episode in the lanes of `which`: with seeds, one a lane, its first, else its next.
     ///
     /// # Errors
