@@ -72,6 +72,7 @@ mod past;
 #[cfg(feature = "io")]
 mod preset;
 mod price_assumption;
+mod price_scatter;
 mod quantum;
 mod queue_place;
 mod quote;

@@ -21,6 +21,7 @@ use super::{
 
 mod aspects;
 mod met;
+mod scatter;
 
 /// Where the orders of a log went, and what a backtest assumes of them.
 #[derive(Debug, Clone)]
@@ -60,6 +61,10 @@ pub struct OrderLog {
     known: Vec<u32>,
     shown_delay: Option<ShownDelay>,
     shown_age: Option<f64>,
+    /// What costs scatter by of themselves [bps], where prices are told finer than in ticks.
+    cost_scatter: Option<f64>,
+    /// Whether its stamps were cut, so that what the market did within a second of a decision may have come before it.
+    cut: bool,
     notes: Vec<String>,
 }
 
@@ -104,6 +109,7 @@ impl OrderLog {
         fills_of_orders(orders, fills)?;
         let mut notes = market.tape.notes().to_vec();
         let Stamps { orders, fills, early } = Stamps::of(orders, fills, &market.tape, &mut notes);
+        let cut = early > 0;
         let (orders, fills) = (orders.as_ref(), fills.as_ref());
         let of_order = fills_of_orders(orders, fills)?;
         let Clocked { orders, fills } = Clocked::of(orders, fills, &of_order, &market.tape, early, &mut notes);
@@ -168,6 +174,8 @@ impl OrderLog {
             market,
             shown_delay,
             shown_age: None,
+            cost_scatter: None,
+            cut,
             own_prints,
             orders: in_flight,
             notes,
@@ -176,6 +184,7 @@ impl OrderLog {
             log.notes.push("the tape shows what the orders of the log did to the market".to_owned());
         }
         let mut measured = log.measure(&executions);
+        log.cost_scatter = log.scatter_of(&measured);
         let seen: Vec<Option<f64>> = rows.iter().map(|(row, _)| orders[*row].seen_mid).collect();
         measured.extend(log.look_at_seen(&seen));
         Ok(Recording { name: name.to_owned(), time: log.times(), stimulus: log, measured })
@@ -210,6 +219,8 @@ impl OrderLog {
             own_prints,
             shown_delay: None,
             shown_age: None,
+            cost_scatter: None,
+            cut: false,
             notes: Vec::new(),
         };
         Recording { name: name.to_owned(), time: log.times(), stimulus: log, measured }
