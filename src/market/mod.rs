@@ -59,6 +59,7 @@ mod log_split;
 mod look;
 mod mail;
 mod margin_call;
+mod met_by_report;
 pub mod mechanism;
 pub mod metric;
 mod money;
