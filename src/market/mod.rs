@@ -59,6 +59,7 @@ mod log_split;
 mod look;
 mod mail;
 mod margin_call;
+mod met_by_report;
 pub mod mechanism;
 pub mod metric;
 mod money;
@@ -72,6 +73,7 @@ mod past;
 #[cfg(feature = "io")]
 mod preset;
 mod price_assumption;
+mod price_scatter;
 mod quantum;
 mod queue_place;
 mod quote;
