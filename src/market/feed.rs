@@ -45,6 +45,17 @@ pub struct Feed {
     low: Option<u32>,
 }
 
+/// Bars of one instrument that come one after the other.
+pub(super) struct BarsAlone<'f> {
+    pub instrument: usize,
+    /// All at hand.
+    pub bars: &'f Arc<Vec<Bar>>,
+    /// Those of them that come before more must be read.
+    pub next: Range<usize>,
+    /// When other data come between.
+    pub end: Timestamp,
+}
+
 impl Feed {
     /// A feed of the given histories, one an instrument.
     #[must_use]
@@ -141,9 +152,8 @@ impl Feed {
         self.lines[instrument].read_on(kind, next, keep)
     }
 
-    /// The bars of an instrument at hand, where one of them comes next: which of them come before more must be read, and when other
-    /// data come between.
-    pub(super) fn bars_alone(&self) -> Option<(usize, &Arc<Vec<Bar>>, Range<usize>, Timestamp)> {
+    /// The bars of an instrument at hand, where one of them comes next.
+    pub(super) fn bars_alone(&self) -> Option<BarsAlone<'_>> {
         let winner = *self.losers.first()?;
         let Track { instrument, kind, next } = self.tracks[winner as usize];
         if kind != RowKind::Bars {
@@ -159,7 +169,7 @@ impl Feed {
             node /= 2;
         }
         let from = next - first;
-        Some((instrument, bars, from..to.max(from), end))
+        Some(BarsAlone { instrument, bars, next: from..to.max(from), end })
     }
 
     /// The first `count` of [these bars](Self::bars_alone) are over.

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use crate::market::feed::BarsAlone;
 use crate::market::sources::RowKind;
 use crate::market::{BacktestError, Strategy};
 use crate::sim2real::Timestamp;
@@ -42,7 +43,7 @@ impl Session {
     /// Shows the strategy the bars of a quiet stretch, up to the first after which something is due.
     #[inline]
     fn pass_quiet_bars(&mut self, strategy: &mut dyn Strategy, last: usize) -> Result<(), BacktestError> {
-        let Some((instrument, bars, next, others)) = self.feed.bars_alone() else { return Ok(()) };
+        let Some(BarsAlone { instrument, bars, next, end: others }) = self.feed.bars_alone() else { return Ok(()) };
         if next.is_empty() {
             return Ok(());
         }

@@ -30,19 +30,19 @@ impl<T: Send + 'static> ReadAhead<T> {
     ///
     /// # Errors
     /// If no thread can be started.
-    pub(in crate::market) fn new<S: Stream<T> + ?Sized + 'static>(stream: Box<S>) -> io::Result<Self>
+    pub(in crate::market) fn new<S: Stream<T> + ?Sized + 'static>(mut stream: Box<S>) -> io::Result<Self>
     where
         T: super::Dated,
     {
         let (ready, pieces) = sync_channel(READY);
         let (used, again) = channel();
-        let reader = Builder::new().name("read-ahead".to_owned()).spawn(move || read(stream, &ready, &again))?;
+        let reader = Builder::new().name("read-ahead".to_owned()).spawn(move || read(&mut *stream, &ready, &again))?;
         Ok(Self { pieces, used, notes: None, reader: Some(reader) })
     }
 }
 
 /// Reads to the end, to an error, or until nobody wants more.
-fn read<T: super::Dated, S: Stream<T> + ?Sized>(mut stream: Box<S>, ready: &SyncSender<Piece<T>>, again: &Receiver<Vec<T>>) {
+fn read<T: super::Dated, S: Stream<T> + ?Sized>(stream: &mut S, ready: &SyncSender<Piece<T>>, again: &Receiver<Vec<T>>) {
     loop {
         let mut rows: Vec<T> = again.try_recv().unwrap_or_default();
         rows.clear();

@@ -35,6 +35,7 @@ pub(super) struct Constants {
 
 /// One number for all lanes, or one for each.
 #[derive(Debug, Clone)]
+#[allow(clippy::large_enum_variant, reason = "there are nine of them in all, and what a loop reads lies beside it")]
 enum Constant {
     Same([f64; TILE]),
     Own(Vec<f64>),

@@ -351,7 +351,8 @@ mod tests {
 
     #[test]
     fn few_messages_tell_of_a_limit_that_varies_and_one_large_one_does_not() {
-        let cut = |varies: f64| -> Vec<[f64; 2]> { (0..12).map(|k| [-30.0 - k as f64, varies * (k as f64 - 5.5)]).collect() };
+        let cut =
+            |varies: f64| -> Vec<[f64; 2]> { (0..12).map(|k| [-30.0 - k as f64, varies * (k as f64 - 5.5)]).collect() };
         assert!(takes_away(&cut(1.5)), "none is restored to a fifth, all together are to a tenth");
         assert!(!takes_away(&cut(3.5)), "too much is left");
         let mut one = cut(1.0);
