@@ -2,7 +2,7 @@
 
 use numpy::{Element, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
-use trueup::rl::{Actions, Out};
+use trueup::rl::{Actions, Kept, Out};
 
 use crate::environment::{Lanes, drive, scattered};
 
@@ -43,6 +43,8 @@ impl BoundLanes {
         terminated: Py<PyArrayDyn<bool>>,
         truncated: Py<PyArrayDyn<bool>>,
     ) -> PyResult<Self> {
+        // Nobody is told of what was last.
+        lanes.borrow_mut(actions.py()).driven().keep(Kept::Nothing);
         let actions = if let Ok(real) = actions.extract() {
             ActionBuffer::Real(real)
         } else if let Ok(choice) = actions.extract() {

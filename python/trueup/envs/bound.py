@@ -29,7 +29,8 @@ class BoundEnvironment:
         As `VectorEnvironment` takes them. Lanes are reset in the step that ends their episode: its reward and flags are those of the
         end, and what is observed is the first observation of the next.
 
-    A loop is then: write `actions`, call ``step()``, read the others.
+    A loop is then: write `actions`, call ``step()``, read the others. What was observed last of an episode is not kept; `VectorEnvironment`
+    tells it.
     """
 
     def __init__(
