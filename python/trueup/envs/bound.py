@@ -84,9 +84,7 @@ class BoundEnvironment:
 
     def step(self, actions: np.ndarray | None = None):
         """Take a step by the buffer of actions, into which `actions` are written before where they are given: all buffers, and no info."""
-        if actions is not None:
-            self.actions[...] = actions
-        self._step()
+        self._step(actions)
         return self._told
 
     def close(self) -> None:
