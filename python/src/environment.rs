@@ -12,7 +12,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyString, PyTuple};
 use trueup::io::hint_among;
 use trueup::market::env::make_on;
-use trueup::rl::{Actions, AutoresetMode, Checked, EnvEntry, EnvError, Out, Threads, VecEnv, Which};
+use trueup::rl::{Actions, AutoresetMode, Checked, EnvEntry, EnvError, Kept, Out, Threads, VecEnv, Which};
 
 use crate::about::about;
 use crate::error;
@@ -128,6 +128,11 @@ impl Lanes {
     pub fn driven(&mut self) -> &mut Driver {
         self.driver.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// What is kept of episodes that end.
+fn kept(informs: bool) -> Kept {
+    if informs { Kept::All } else { Kept::Observations }
 }
 
 /// The choice that an action is, if it is one whole number: of Python or of NumPy.
@@ -330,7 +335,7 @@ impl Lanes {
     #[setter]
     fn set_informs(&mut self, informs: bool) {
         self.informs = informs;
-        self.driven().keep_info(informs);
+        self.driven().keep(kept(informs));
     }
 
     /// The same lanes once more, which go on with the same bits.
@@ -342,7 +347,7 @@ impl Lanes {
     fn load(&mut self, other: &Self) {
         *self = Self { informs: self.informs, reader: self.reader.take(), ..other.copy() };
         let informs = self.informs;
-        self.driven().keep_info(informs);
+        self.driven().keep(kept(informs));
     }
 
     /// Makes lane `to` a copy of lane `from`.

@@ -319,6 +319,18 @@ def test_bound_buffers_answer_to_whatever_is_in_them():
             bound.step()
         assert error.value.hint and np.array_equal(bound.observations, kept)
     assert np.array_equal(bound.step([0, 1, 0])[0], twin.step([0, 1, 0])[0])
+    # Actions are given in any form that NumPy writes into an array, views of the buffer itself among them.
+    for given in ([1, 0, 1], np.array([1, 1, 0]), np.array([0, 1, 1], np.int32), np.array([1, 9, 0, 9, 1])[::2], 1, bound.actions, bound.actions[::-1]):
+        twin.actions[...] = np.array(given)
+        assert np.array_equal(bound.step(given)[0], twin.step()[0]) and np.array_equal(bound.actions, twin.actions)
+    long = np.zeros(4, np.int64)
+    within = envs.BoundEnvironment(CART_POLE, 3, actions=long[:3])
+    within.reset(seed=2)
+    long[:] = [0, 1, 1, 0]
+    assert len(within.step(long[1:])[0]) == 3 and long.tolist() == [1, 1, 0, 0]
+    for given in (np.zeros(2, np.int64), "x", {}, np.zeros((2, 3))):
+        with pytest.raises((TypeError, ValueError)):
+            bound.step(given)
     real = envs.BoundEnvironment("trueup/Pendulum-v0", 2)
     real.reset(seed=0)
     for wrong in (np.nan, np.inf, 3.0):

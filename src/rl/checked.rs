@@ -1,6 +1,8 @@
 //! The front door of an environment: whatever it is given, it answers with a step or an error, and never with a panic.
 
-use super::{About, Actions, Autoreset, AutoresetMode, EnvError, Finals, Occasion, Options, Out, Space, VecEnv, Which};
+use super::{
+    About, Actions, Autoreset, AutoresetMode, EnvError, Finals, Kept, Occasion, Options, Out, Space, VecEnv, Which,
+};
 
 /// Drives an environment and checks all it is given: before anything moves, so that after an error all is as it was.
 ///
@@ -80,9 +82,9 @@ impl<E: VecEnv> Checked<E> {
         self.driver.finals()
     }
 
-    /// Whether info of episodes that end is kept in the [`finals`](Self::finals), as it is from the beginning.
-    pub fn keep_info(&mut self, keep: bool) {
-        self.driver.keep_info(keep);
+    /// What of episodes that end is kept as [`finals`](Self::finals): everything from the beginning.
+    pub fn keep(&mut self, kept: Kept) {
+        self.driver.keep(kept);
     }
 
     /// Begins an episode in the lanes of `which`: with seeds, one a lane, its first, else its next.

@@ -133,30 +133,28 @@ impl CartPoleLanes {
         }
     }
 
-    /// A step of up to `N` lanes from lane `first` on.
+    /// A step of the `N` lanes from lane `first` on: as many at any time, so that compilers know how far their loops go.
     #[inline(always)]
-    fn step_tile<const N: usize>(&mut self, first: usize, actions: &[i64], out: &mut Out<'_>) {
-        let count = actions.len();
-        let own = first..first + count;
+    fn step_tile<const N: usize>(&mut self, first: usize, actions: &[i64; N], out: &mut Out<'_>) {
+        let own = first..first + N;
         let steps = &mut self.steps[own.clone()];
         let mut commands = [0.0; N];
-        let commands = &mut commands[..count];
         match &mut self.delay {
-            None => plain(actions, commands),
-            Some(delay) => delay.pass(first, actions, steps, commands),
+            None => plain(actions, &mut commands),
+            Some(delay) => delay.pass(first, actions, steps, &mut commands),
         }
         steps.iter_mut().for_each(|steps| *steps = steps.saturating_add(1));
         late(steps, self.max_steps, &mut out.truncated[own.clone()]);
         let (position, velocity) = (&mut self.position[own.clone()], &mut self.velocity[own.clone()]);
         let (angle, spin) = (&mut self.angle[own.clone()], &mut self.spin[own.clone()]);
-        advance::<N>(position, velocity, angle, spin, commands, &self.constants, first, self.step);
+        advance(position, velocity, angle, spin, &commands, &self.constants, first, self.step);
         over(position, angle, self.thresholds, &mut out.terminated[own.clone()]);
         let (rows, _) = out.observations[4 * first..4 * own.end].as_chunks_mut();
         match &mut self.noise {
             None => write(position, velocity, angle, spin, rows),
             Some(noise) => {
                 let mut seen = [0.0; N];
-                noise.add(first, position, &mut seen[..count]);
+                noise.add(first, position, &mut seen);
                 write(&seen, velocity, angle, spin, rows);
             }
         }
@@ -178,11 +176,19 @@ impl NullaryFnOnce for Stepped<'_> {
     fn call(self) {
         let Self { lanes, actions, mut out } = self;
         let (tiles, left) = actions.as_chunks::<TILE>();
-        for (tile, actions) in tiles.iter().enumerate() {
-            lanes.step_tile::<TILE>(tile * TILE, actions, &mut out);
+        let (small, single) = left.as_chunks::<SMALL_TILE>();
+        let mut first = 0;
+        for actions in tiles {
+            lanes.step_tile(first, actions, &mut out);
+            first += TILE;
         }
-        for (tile, actions) in left.chunks(SMALL_TILE).enumerate() {
-            lanes.step_tile::<SMALL_TILE>(tiles.len() * TILE + tile * SMALL_TILE, actions, &mut out);
+        for actions in small {
+            lanes.step_tile(first, actions, &mut out);
+            first += SMALL_TILE;
+        }
+        for action in single {
+            lanes.step_tile(first, &[*action], &mut out);
+            first += 1;
         }
     }
 }
@@ -260,6 +266,40 @@ impl NullaryFnOnce for Begun<'_> {
 mod tests {
     use super::*;
     use crate::rl::Buffers;
+
+    /// In tiles, in small ones, and by itself: 64, 8 and 1 lanes at a time.
+    #[test]
+    fn a_lane_has_the_same_bits_however_many_are_stepped_with_it() {
+        let values = [1.0, 0.1, 0.5, 9.8, 0.1, 0.01, 10.0, 0.03, 0.01];
+        let wires = Wires { delay: Some(7), noise: Some(8) };
+        let thresholds = Thresholds { position: 2.4, angle: 0.2 };
+        let start = Start { low: -0.3, high: 0.3 };
+        let run = |seeds: &[u64]| {
+            let count = seeds.len();
+            let mut lanes = CartPoleLanes::new(count, &values, |k| k == 3, wires, (0.02, 500), thresholds);
+            let mut buffers = Buffers::new(count, 4);
+            let all: Vec<u32> = (0..count as u32).collect();
+            let episodes: Vec<Episode> = seeds.iter().map(|seed| Episode { seed: *seed, number: 2 }).collect();
+            let tuned =
+                |seed: u64| [1.0, 0.1, 0.5, 9.0 + seed as f64 * 0.01, 0.1, 0.01, 10.0, 0.01 * (seed % 9) as f64, 0.01];
+            seeds.iter().enumerate().for_each(|(lane, seed)| lanes.retune(lane, &tuned(*seed)));
+            lanes.begin(&all, &episodes, start, &mut buffers.observations);
+            let mut seen: Vec<Vec<[u32; 4]>> = vec![Vec::new(); count];
+            for step in 0..60 {
+                let actions: Vec<i64> = seeds.iter().map(|seed| ((seed + step) / 3 % 2) as i64).collect();
+                for (seen, row) in seen.iter_mut().zip(buffers.observations.as_chunks::<4>().0) {
+                    seen.push(row.map(f32::to_bits));
+                }
+                lanes.step(&actions, &mut buffers.out());
+            }
+            seen
+        };
+        let seeds: Vec<u64> = (0..85).collect();
+        let together = run(&seeds);
+        for (seed, together) in seeds.iter().zip(together) {
+            assert_eq!(run(&[*seed])[0], together, "seed {seed}");
+        }
+    }
 
     #[test]
     fn what_is_over_stays_finite() {

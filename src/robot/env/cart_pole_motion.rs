@@ -7,7 +7,7 @@ use crate::robot::sine::sine;
 /// Lanes that are stepped at once: what is known of them between one loop and the next stays close to the processor.
 pub(super) const TILE: usize = 64;
 
-/// The same of lanes that fill no tile: of a few lanes, room for many would take longer than their step.
+/// The same of lanes that fill no tile; what is left of them goes one by one.
 pub(super) const SMALL_TILE: usize = 8;
 
 /// The parameters as the equations have them. With a cart of mass `M`, a pole of mass `m` and half length `l`:
@@ -162,7 +162,7 @@ const FASTEST: f64 = 1e4;
 /// What lanes go through in a step, one number each: cart position [m] and velocity [m/s], pole angle [rad] and angular velocity
 /// [rad/s], each in an argument of its own, of which compilers know that it does not overlap with another.
 ///
-/// A step of Euler's method [s] of up to `N` lanes, of which the first is lane `first`, under these commands.
+/// A step of Euler's method [s] of the `N` lanes from lane `first` on, under these commands.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "see above")]
 pub(super) fn advance<const N: usize>(
@@ -170,7 +170,7 @@ pub(super) fn advance<const N: usize>(
     velocity: &mut [f64],
     angle: &mut [f64],
     spin: &mut [f64],
-    commands: &[f64],
+    commands: &[f64; N],
     constants: &Constants,
     first: usize,
     step: f64,

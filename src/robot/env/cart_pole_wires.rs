@@ -2,7 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "one index for many rows is what becomes vector instructions")]
 
-use crate::sim2real::normal_draw::{AT_ONCE, normals};
+use crate::sim2real::normal_draw::{AT_ONCE, normal, normals};
 use crate::sim2real::split_mix::next_bits;
 use crate::sim2real::{Seed, SplitMix64};
 
@@ -128,16 +128,10 @@ impl Noise {
         for (((std, draws), positions), seen) in std.iter().zip(draws).zip(positions).zip(seen) {
             add_eight(std, draws, positions, seen);
         }
-        let left = positions_left.len();
-        if left > 0 {
-            let (mut std, mut draws) = ([0.0; AT_ONCE], [0; AT_ONCE]);
-            let (mut positions, mut seen) = ([0.0; AT_ONCE], [0.0; AT_ONCE]);
-            std[..left].copy_from_slice(std_left);
-            draws[..left].copy_from_slice(draws_left);
-            positions[..left].copy_from_slice(positions_left);
-            add_eight(&std, &mut draws, &positions, &mut seen);
-            draws_left.copy_from_slice(&draws[..left]);
-            seen_left.copy_from_slice(&seen[..left]);
+        for (((std, state), position), seen) in std_left.iter().zip(draws_left).zip(positions_left).zip(seen_left) {
+            let mut draws = SplitMix64::at(*state);
+            *seen = position + std * normal(draws.bits());
+            *state = draws.state();
         }
     }
 
