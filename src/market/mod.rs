@@ -106,6 +106,7 @@ mod run_stream;
 mod session;
 mod shown_age;
 mod sources;
+mod spare;
 mod strategy;
 mod stream;
 #[cfg(feature = "io")]

@@ -114,7 +114,8 @@ impl PreparedRun {
     /// # Errors
     /// As [`prepare_run`], but for what it says of files.
     pub fn variant(&self, run: &RunFile) -> Result<Backtest, InputError> {
-        set_up(run, self.backtest.histories().to_vec(), &self.beside)
+        let backtest = set_up(run, self.backtest.histories().to_vec(), &self.beside)?;
+        Ok(backtest.beside(&self.backtest))
     }
 
     /// All that `record`, the record of this backtest, is shown as.
