@@ -12,7 +12,7 @@ use proptest::prelude::{ProptestConfig, any, proptest};
 use trueup::market::metric::RoundTrip;
 use trueup::market::{
     Account, ActionKind, Backtest, Cash, CorporateAction, Fraction, Instrument, Multiplier, OrderKind, Orders, Price,
-    Quantity, Rate, Reason, Record, Requirement, Role, Sender, Side, Strategy, Terms, View,
+    Quantity, Rate, Reason, Record, Requirement, Role, Sender, Settings, Side, Strategy, Terms, View,
 };
 use trueup::sim2real::Timestamp;
 use ways_scene::same_every_way;
@@ -56,13 +56,18 @@ impl Strategy for Drawn {
 
 /// Three instruments of their own terms on walks of 60 bars, drawn from `seed`.
 fn drawn_market(seed: u64) -> Backtest {
+    market_of(seed, 60)
+}
+
+/// The same, of so many bars: prices stay within a third and three times of where they start.
+fn market_of(seed: u64, count: i64) -> Backtest {
     let mut draws = Drawn(seed);
     let mut walk = |start: f64| {
         let mut price = start;
-        let rows: Vec<(f64, f64)> = (0..60)
+        let rows: Vec<(f64, f64)> = (0..count)
             .map(|_| {
                 let open = price;
-                price = (price * (0.97 + 0.001 * draws.draw(61) as f64)).max(1.0);
+                price = (price * (0.97 + 0.001 * draws.draw(61) as f64)).clamp(start / 3.0, 3.0 * start);
                 ((open * 100.0).round() / 100.0, (price * 100.0).round() / 100.0)
             })
             .collect();
@@ -79,7 +84,7 @@ fn drawn_market(seed: u64) -> Backtest {
         Terms { currency: 2, multiplier: Multiplier::new(7).unwrap(), long: margin(10, 8), short: margin(10, 8) },
     ];
     let rates: Vec<_> =
-        (0..60).map(|k| (Timestamp(k * MINUTE + 7), Price(1_000_000_000 + draws.draw(300_000_001) as i64))).collect();
+        (0..count).map(|k| (Timestamp(k * MINUTE + 7), Price(1_000_000_000 + draws.draw(300_000_001) as i64))).collect();
     let mut actions: Vec<CorporateAction> = (0..9)
         .map(|k| {
             let (instrument, minutes) = (k % 3, 2 + draws.draw(57) as i64);
@@ -128,6 +133,32 @@ fn cash_by_hand(record: &Record) -> Vec<i128> {
     all
 }
 
+/// Each currency holds what fills, dividends, charges and splits leave of what it began with, and all of them together are the equity:
+/// to the last unit.
+fn adds_up(record: &Record) {
+    let ledger = &record.ledger;
+    let by_hand = cash_by_hand(record);
+    let trips = RoundTrip::of(record).unwrap();
+    let (mut exact, one) = (0_i128, 1_000_000_000_i128);
+    for (k, balance) in ledger.balances().iter().enumerate() {
+        assert_eq!(balance.cash.0, by_hand[k], "currency {k}");
+        let mut worth = balance.opening.0;
+        for (number, (position, income)) in ledger.positions().iter().zip(ledger.income()).enumerate() {
+            if position.currency != k {
+                continue;
+            }
+            let gain = position.realised.0 + position.value().0 - position.basis.0;
+            let by_trips: i128 = trips.iter().filter(|trip| trip.instrument == number).map(|trip| trip.gross.0).sum();
+            assert_eq!(gain, by_trips, "instrument {number}");
+            worth += gain - position.fees.0 + income.dividends.0 - income.withheld.0 - income.charges.total().unwrap().0;
+        }
+        assert_eq!(balance.worth().unwrap().0, worth, "currency {k}");
+        exact += worth * balance.rate.map_or(one, |rate| i128::from(rate.0));
+    }
+    assert_eq!(ledger.equity().unwrap().0, exact.div_euclid(one));
+    assert_eq!(record.equity.last().unwrap().equity, ledger.equity().unwrap().to_f64());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
@@ -136,27 +167,7 @@ proptest! {
     fn a_run_with_everything_reconciles_to_the_last_unit(seed in any::<u64>()) {
         let backtest = drawn_market(seed);
         let record = backtest.run(&mut Drawn(seed ^ 0x5bd1_e995)).unwrap();
-        let ledger = &record.ledger;
-        let by_hand = cash_by_hand(&record);
-        let trips = RoundTrip::of(&record).unwrap();
-        let (mut exact, one) = (0_i128, 1_000_000_000_i128);
-        for (k, balance) in ledger.balances().iter().enumerate() {
-            assert_eq!(balance.cash.0, by_hand[k], "currency {k}");
-            let mut worth = balance.opening.0;
-            for (number, (position, income)) in ledger.positions().iter().zip(ledger.income()).enumerate() {
-                if position.currency != k {
-                    continue;
-                }
-                let gain = position.realised.0 + position.value().0 - position.basis.0;
-                let by_trips: i128 = trips.iter().filter(|trip| trip.instrument == number).map(|trip| trip.gross.0).sum();
-                assert_eq!(gain, by_trips, "instrument {number}");
-                worth += gain - position.fees.0 + income.dividends.0 - income.withheld.0 - income.charges.total().unwrap().0;
-            }
-            assert_eq!(balance.worth().unwrap().0, worth, "currency {k}");
-            exact += worth * balance.rate.map_or(one, |rate| i128::from(rate.0));
-        }
-        assert_eq!(ledger.equity().unwrap().0, exact.div_euclid(one));
-        assert_eq!(record.equity.last().unwrap().equity, ledger.equity().unwrap().to_f64());
+        adds_up(&record);
         let again = drawn_market(seed).run(&mut Drawn(seed ^ 0x5bd1_e995)).unwrap();
         assert_eq!(record, again);
         same_every_way(&backtest, &record, &Drawn(seed ^ 0x5bd1_e995), 1 + seed as usize % 7);
@@ -182,4 +193,21 @@ fn the_drawn_markets_hold_every_kind_of_thing() {
         calls > 0 && splits > 0 && paid > 12 && margin > 0,
         "{calls} calls, {splits} ended, {paid} paid, {margin} refused"
     );
+}
+
+/// A million orders of one account, of which more than half fill: nothing drifts.
+#[test]
+fn a_million_orders_create_and_lose_nothing() {
+    let backtest = market_of(11, 600_000);
+    let settings = Settings { max_leverage: 1e6, ..backtest.settings().clone() };
+    let rich = Settings { cash: Cash::nearest(1e10).unwrap(), ..settings };
+    let (instruments, venue) = (backtest.instruments().to_vec(), backtest.venue().clone());
+    let backtest = Backtest::new(instruments, backtest.histories().to_vec(), venue, rich).unwrap();
+    let record = backtest.run(&mut Drawn(12)).unwrap();
+    let (orders, fills) = (record.blotter.orders.len(), record.blotter.fills.len());
+    println!("{orders} orders, {fills} fills, {:?}", record.blotter.rejected);
+    assert!(orders > 1_000_000 && fills > 500_000, "{orders} orders, {fills} fills");
+    adds_up(&record);
+    let filled: i128 = record.blotter.fills.iter().map(|fill| i128::from(fill.quantity.0)).sum();
+    assert_eq!(filled, record.blotter.orders.iter().map(|order| i128::from(order.filled.0)).sum::<i128>());
 }
