@@ -59,48 +59,67 @@ pub(super) enum Due {
 }
 
 /// What is due, in the order of time, phase, and then in the order in which it was put down.
+///
+/// What is due first stands before a heap of the rest: nearly always there is no rest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Agenda {
-    due: BinaryHeap<Reverse<(Timestamp, Phase, u64, Due)>>,
+    first: Option<Entry>,
+    rest: BinaryHeap<Reverse<Entry>>,
     entries: u64,
+}
+
+/// Something due, and when. The number of an entry is its own, so that what is due never decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Entry {
+    at: Timestamp,
+    phase: Phase,
+    number: u64,
+    due: Due,
 }
 
 impl Agenda {
     pub fn put(&mut self, at: Timestamp, phase: Phase, due: Due) {
         self.entries += 1;
-        self.due.push(Reverse((at, phase, self.entries, due)));
+        let entry = Entry { at, phase, number: self.entries, due };
+        match &mut self.first {
+            None => self.first = Some(entry),
+            Some(first) if entry < *first => self.rest.push(Reverse(std::mem::replace(first, entry))),
+            Some(_) => self.rest.push(Reverse(entry)),
+        }
     }
 
     /// When the next is due, and in which phase.
     #[inline]
     pub fn peek(&self) -> Option<(Timestamp, Phase)> {
-        self.due.peek().map(|Reverse((at, phase, ..))| (*at, *phase))
+        self.first.as_ref().map(|entry| (entry.at, entry.phase))
     }
 
     /// What is due next.
     pub fn next_due(&self) -> Option<Due> {
-        self.due.peek().map(|Reverse((.., due))| *due)
+        self.first.as_ref().map(|entry| entry.due)
     }
 
     /// Changes what is due, and drops that of which nothing is left; all else stays in its order.
     pub fn revise(&mut self, mut revised: impl FnMut(Due) -> Option<Due>) {
         // Sorted, what is due first comes last.
-        let all = std::mem::take(&mut self.due).into_sorted_vec();
-        let kept = all
-            .into_iter()
-            .rev()
-            .filter_map(|Reverse((at, phase, entry, due))| Some(Reverse((at, phase, entry, revised(due)?))));
-        self.due = kept.collect();
+        let all = std::mem::take(&mut self.rest).into_sorted_vec();
+        let all = self.first.take().into_iter().chain(all.into_iter().rev().map(|Reverse(entry)| entry));
+        let mut kept = all.filter_map(|entry| Some(Entry { due: revised(entry.due)?, ..entry }));
+        self.first = kept.next();
+        self.rest = kept.map(Reverse).collect();
     }
 
+    #[inline]
     pub fn pop(&mut self) -> Option<(Timestamp, Due)> {
-        self.due.pop().map(|Reverse((at, _, _, due))| (at, due))
+        let next = if self.rest.is_empty() { None } else { self.rest.pop().map(|Reverse(entry)| entry) };
+        std::mem::replace(&mut self.first, next).map(|entry| (entry.at, entry.due))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn at_one_instant_phases_come_in_order_and_then_what_was_put_down_first() {
@@ -113,6 +132,25 @@ mod tests {
         }
         let order: Vec<Due> = std::iter::from_fn(|| agenda.pop().map(|(_, due)| due)).collect();
         assert_eq!(order, [3, 2, 1, 4].map(|id| Due::Arrive(OrderId(id))));
+    }
+
+    proptest! {
+        #[test]
+        fn it_is_a_list_in_order(steps in proptest::collection::vec((0..6_i64, 0..3_usize, any::<bool>()), 0..60)) {
+            let (mut agenda, mut list) = (Agenda::default(), Vec::new());
+            for (k, (time, phase, put)) in steps.into_iter().enumerate() {
+                let (at, phase) = (Timestamp(time), [Phase::Before, Phase::Data, Phase::Notices][phase]);
+                if put {
+                    agenda.put(at, phase, Due::Notice(k));
+                    list.push((at, phase, k));
+                    list.sort();
+                } else {
+                    let first = if list.is_empty() { None } else { Some(list.remove(0)) };
+                    prop_assert_eq!(agenda.pop(), first.map(|(at, _, k)| (at, Due::Notice(k))));
+                }
+                prop_assert_eq!(agenda.peek(), list.first().map(|(at, phase, _)| (*at, *phase)));
+            }
+        }
     }
 
     #[test]
