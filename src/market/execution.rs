@@ -261,6 +261,10 @@ impl Plant for Execution {
         Self::resolution_of(recording, channel)
     }
 
+    fn sent(&self, recording: &Recording<OrderLog>) -> usize {
+        recording.stimulus.sent()
+    }
+
     /// What costs scatter by, where prices are told finer than in ticks; but of no more than a price that is rounded to its tick.
     fn scatter(&self, recording: &Recording<OrderLog>, channel: &str) -> f64 {
         let own = recording.stimulus.cost_scatter().filter(|_| channel == "cost");

@@ -33,6 +33,10 @@ pub trait Simulator: Send + Sync {
     fn scatter(&self, _recording: &Recording<Self::Stimulus>, _channel: &str) -> f64 {
         0.0
     }
+    /// How many commands a recording of messages holds; of samples of a signal it is as many as there are rows.
+    fn sent(&self, recording: &Recording<Self::Stimulus>) -> usize {
+        recording.time.len()
+    }
     /// What a residual may depend on when something is missing, row by row: the remainder is tested against each.
     fn covariates(&self, recording: &Recording<Self::Stimulus>) -> Vec<Covariate>;
     /// What was left out or is peculiar about `recording`, in words a report can show.

@@ -23,6 +23,12 @@ impl OrderLog {
         self.cut
     }
 
+    /// How many orders, and fills of orders that rested, tell of what mechanisms do.
+    #[must_use]
+    pub fn sent(&self) -> usize {
+        self.orders.len() + self.made.len()
+    }
+
     /// What the costs among `measured` scatter by.
     pub(super) fn scatter_of(&self, measured: &[Measured]) -> Option<f64> {
         let cost = measured.iter().find(|channel| channel.channel == "cost")?;

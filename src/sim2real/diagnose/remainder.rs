@@ -23,7 +23,7 @@ const FOLLOWED: f64 = 2.0;
 /// Where rows are messages the misfit is taken about its mean: a constant cost is something that any simulator can be
 /// given, and no measure of what was explained. How much noise messages have nobody knows but where a channel is exact: of what is left
 /// elsewhere that counts which depends on something.
-pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> f64 {
+pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, depends: &[OfChannel]) -> f64 {
     let blocks = inquiry.problem(inquiry.twin, &inquiry.evidence.compared).blocks();
     let about_mean = inquiry.twin.clock() == Clock::Event;
     selection
@@ -37,19 +37,19 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
             let sum: f64 = whiteness::of_channel(residual, &blocks, &first.channel).iter().flat_map(|s| s.iter()).sum();
             let constant = if about_mean { sum * sum / count.max(1.0) } else { 0.0 };
             let misfit = first.sum_of_squares - constant - last.level * count;
-            (misfit > (NEAR_THE_NOISE - 1.0) * last.level * count).then(|| left(inquiry, selection, last) / misfit)
+            (misfit > (NEAR_THE_NOISE - 1.0) * last.level * count).then(|| left(inquiry, depends, last) / misfit)
         })
         .fold(0.0, f64::max)
 }
 
-/// What is left of a channel that the selected twin leaves like that.
-fn left<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, last: &ChannelMisfit) -> f64 {
+/// What is left of a channel that the selected twin leaves like that, of which residuals of messages depend on something.
+fn left<T: Twin>(inquiry: &Inquiry<'_, T>, depends: &[OfChannel], last: &ChannelMisfit) -> f64 {
     let above = last.above(last.level);
     if inquiry.twin.clock() != Clock::Event || is_exact(inquiry, &last.channel) {
         return above;
     }
-    let explained = dependences(inquiry, &selection.selected, |channel| channel == last.channel).map(|d| d.explained);
-    explained.sum::<f64>().min(above)
+    let own = depends.iter().filter(|one| one.channel == last.channel);
+    own.map(|one| one.dependence.explained).sum::<f64>().min(above)
 }
 
 /// Whether `fit`, that of `selected` in free run, leaves no more than about the noise.
@@ -58,33 +58,38 @@ pub(super) fn followed<T>(fit: &Fit, selected: &Hypothesis<T>) -> bool {
     fit.residual.norm_squared() <= FOLLOWED * level * fit.residual.len() as f64
 }
 
-/// What the remaining residuals of messages depend on most.
-pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
-    if inquiry.twin.clock() != Clock::Event {
-        return None;
-    }
-    // Below what numbers are rounded to there is nothing to explain, however regular it is: rounding is regular too.
+/// What the residuals of a channel of messages depend on most in one recording.
+pub(super) struct OfChannel {
+    channel: String,
+    dependence: Dependence,
+}
+
+/// What the remaining residuals of messages depend on most, channel by channel, of those that leave more than what numbers are rounded
+/// to: below it there is nothing to explain, however regular it is, for rounding is regular too.
+pub(super) fn dependences<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Vec<OfChannel> {
     let rounded = |channel: &str| {
         let misfit = selected.misfits.iter().find(|misfit| misfit.channel == channel);
         misfit.is_none_or(|misfit| misfit.within(NEAR_THE_NOISE, inquiry.evidence.rounding_of(channel)))
     };
-    dependences(inquiry, selected, |channel| !rounded(channel)).max_by(|a, b| a.strength.total_cmp(&b.strength))
-}
-
-/// What the residuals of messages depend on most, one of each recording and each of those `channels`.
-fn dependences<T: Twin>(
-    inquiry: &Inquiry<'_, T>,
-    selected: &Hypothesis<T>,
-    channels: impl Fn(&str) -> bool,
-) -> impl Iterator<Item = Dependence> {
+    if inquiry.twin.clock() != Clock::Event || selected.misfits.iter().all(|misfit| rounded(&misfit.channel)) {
+        return Vec::new();
+    }
     let parts = &inquiry.evidence.compared;
     let residual = selected.fit.residual.as_slice();
-    let blocks = inquiry.problem(&selected.twin, parts).blocks().into_iter().filter(|block| channels(&block.channel));
+    // Looking them up takes as long as a fit where a tape is long.
+    let covariates: Vec<Vec<Covariate>> = parts.iter().map(|part| inquiry.twin.covariates(part.recording)).collect();
+    let blocks = inquiry.problem(&selected.twin, parts).blocks().into_iter().filter(|block| !rounded(&block.channel));
     let of = |block: Block| {
-        let covariates = inquiry.twin.covariates(parts[block.part].recording);
-        strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates)
+        let dependence = strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates[block.part])?;
+        Some(OfChannel { channel: block.channel, dependence })
     };
-    blocks.filter_map(of).collect::<Vec<_>>().into_iter()
+    blocks.filter_map(of).collect()
+}
+
+/// The strongest of them.
+pub(super) fn strongest(depends: &[OfChannel]) -> Option<Dependence> {
+    let all = depends.iter().map(|one| &one.dependence);
+    all.max_by(|a, b| a.strength.total_cmp(&b.strength)).cloned()
 }
 
 /// The part of what is left of sampled signals that the motion foretells on held-out data.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Found;
 use super::diagnosis::{ChannelFit, Checks, Diagnosis, Effect, ParameterChange, SCHEMA, Score, Verdict, Where};
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::remainder::NEAR_THE_NOISE;
+use super::remainder::{NEAR_THE_NOISE, dependences, strongest};
 use super::rivals::Place;
 use super::select::Selection;
 use super::structure::Dependence;
@@ -58,6 +58,18 @@ pub(super) struct Findings {
     pub sampled: bool,
     /// Whether what knows no noise is off.
     pub inexact: bool,
+    /// Whether what was named of messages is refuted by others, though something is missing.
+    pub refuted: bool,
+}
+
+/// Whether what was named of messages does worse than nothing on those held out, while without it they depend on something: what was
+/// fitted is not what is missing.
+pub(super) fn refuted<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, fits: &[ChannelFit]) -> bool {
+    let messages = inquiry.twin.clock() == Clock::Event && !selection.selected.added.is_empty();
+    messages
+        && !fits.iter().any(|fit| fit.improvement_ci95[0] > 0.0)
+        && fits.iter().any(worse)
+        && strongest(&dependences(inquiry, &selection.recalibrated)).is_some_and(|d| d.strength > DEPENDENT)
 }
 
 /// The whole result.
@@ -265,6 +277,7 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
             // What held-out data hardly reach, they do not speak against.
             true if library(effects) >= CERTAIN && !findings.fits.iter().any(worse) => Verdict::Ambiguous,
             true if library(effects) < LIKELIER_THAN_NOT && visible => Verdict::Unexplained,
+            false if findings.refuted => Verdict::Unexplained,
             _ => Verdict::NotExcited,
         };
     }

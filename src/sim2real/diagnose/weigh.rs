@@ -170,6 +170,12 @@ fn share_of(clock: Clock, mechanisms: usize) -> f64 {
     }
 }
 
+/// The part of the first misfit that even what completes an explanation must explain: where many messages tell a law's form, one of its
+/// kind explains away to the noise what the form is off by.
+fn least_share_of(clock: Clock) -> f64 {
+    if clock == Clock::Event { SHARE } else { 0.0 }
+}
+
 /// Whether `better` explains nearly all that `other` leaves above noise as white as what `better` leaves.
 pub(super) fn completes<T>(other: &Hypothesis<T>, better: &Hypothesis<T>) -> bool {
     other.misfits.iter().zip(&better.misfits).any(|(other, better)| {
@@ -214,7 +220,7 @@ pub(super) fn needed<T: Twin>(
             let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
             let noise_alone = less.like_noise() && explained < MORE_THAN_NOISE * less.sum_of_squares;
             explained >= share_of(inquiry.twin.clock(), whole.added.len()) * all
-                || !noise_alone && explained >= COMPLETES * left
+                || !noise_alone && explained >= COMPLETES * left && explained >= least_share_of(inquiry.twin.clock()) * all
         });
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let change = || (0..rows).map(|i| less.fit.residual[i] - whole.fit.residual[i]);
@@ -229,9 +235,14 @@ pub(super) fn needed<T: Twin>(
     let restored = restored.count();
     let few = restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64;
     let pairs: Vec<[f64; 2]> = (0..rows).map(|i| [less.fit.residual[i], whole.fit.residual[i]]).collect();
-    let seen = inquiry.twin.clock() == Clock::Event && (few || takes_away(&pairs));
+    let seen = inquiry.twin.clock() == Clock::Event && (few || takes_away(&pairs) || most_of_few(moved, rows));
     let spread = rows > 40 * INFORMATIVE_ROWS && second * second >= INFORMATIVE_ROWS as f64 * fourth;
     enough && (spread || seen || moved >= INFORMATIVE_ROWS)
+}
+
+/// Whether so many are most of all the messages there are, where these are no more than a few times as many as would tell of anything.
+fn most_of_few(moved: usize, messages: usize) -> bool {
+    messages <= INFORMATIVE_ROWS && moved >= 2 * FEW_ROWS && moved as f64 >= MOST * messages as f64
 }
 
 /// Whether of the messages that are moved, each off by so much before and after, nearly all that they were off by is gone, and more than a
@@ -333,17 +344,21 @@ mod tests {
         let sampled = Clock::Sampled { longest_step: 0.01 };
         assert!(share_of(Clock::Event, 2) > 2.0 * share_of(sampled, 2), "it is not asked whether it carries over");
         assert!(share_of(sampled, 3) > share_of(Clock::Event, 2));
+        assert!(least_share_of(Clock::Event) > 0.0 && least_share_of(Clock::Event) < share_of(Clock::Event, 2));
+        assert_eq!(least_share_of(sampled), 0.0);
         assert!((share_of(Clock::Event, 3) - share_of(sampled, 3)).abs() < f64::EPSILON);
     }
 
     #[test]
     fn few_messages_tell_of_a_limit_that_varies_and_one_large_one_does_not() {
-        let cut = |varies: f64| -> Vec<[f64; 2]> { (0..12).map(|k| [-30.0 - k as f64, varies * (k as f64 - 5.5)]).collect() };
+        let cut =
+            |varies: f64| -> Vec<[f64; 2]> { (0..12).map(|k| [-30.0 - k as f64, varies * (k as f64 - 5.5)]).collect() };
         assert!(takes_away(&cut(1.5)), "none is restored to a fifth, all together are to a tenth");
         assert!(!takes_away(&cut(3.5)), "too much is left");
         let mut one = cut(1.0);
         one.push([-900.0, 2.0]);
         assert!(!takes_away(&one), "one of them is nearly all there is");
+        assert!(most_of_few(9, 10) && !most_of_few(7, 7) && !most_of_few(9, 12) && !most_of_few(30, 30));
         assert!(!takes_away(&[[-30.0, 0.0]; 3]) && takes_away(&[[-30.0, 0.0]; 4]) && !takes_away(&[]));
     }
 
