@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 
-use super::exact::is_exact;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
@@ -15,14 +14,17 @@ use crate::sim2real::{Clock, Covariate, Measured, Part, Recording, Twin};
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
 pub(super) const NEAR_THE_NOISE: f64 = 1.5;
 
+/// Noise of which rounding has this part of the variance is rounding.
+const ALL_OF_IT: f64 = 0.99;
+
 /// A run whose mean squared residual is at most this many times the noise follows what was recorded.
 const FOLLOWED: f64 = 2.0;
 
 /// The part of the recalibrated misfit above the noise that is left: of the channel in which most is left.
 ///
 /// Where rows are messages the misfit is taken about its mean: a constant cost is something that any simulator can be
-/// given, and no measure of what was explained. How much noise messages have nobody knows but where a channel is exact: of what is left
-/// elsewhere that counts which depends on something.
+/// given, and no measure of what was explained. How much noise messages have nobody knows but where it is that of rounding: of what is
+/// left elsewhere that counts which depends on something.
 pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, depends: &[OfChannel]) -> f64 {
     let blocks = inquiry.problem(inquiry.twin, &inquiry.evidence.compared).blocks();
     let about_mean = inquiry.twin.clock() == Clock::Event;
@@ -45,7 +47,8 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
 /// What is left of a channel that the selected twin leaves like that, of which residuals of messages depend on something.
 fn left<T: Twin>(inquiry: &Inquiry<'_, T>, depends: &[OfChannel], last: &ChannelMisfit) -> f64 {
     let above = last.above(last.level);
-    if inquiry.twin.clock() != Clock::Event || is_exact(inquiry, &last.channel) {
+    // Where noise is rounding and no more, all that is above it is something.
+    if inquiry.twin.clock() != Clock::Event || inquiry.evidence.rounding_of(&last.channel) > ALL_OF_IT {
         return above;
     }
     let own = depends.iter().filter(|one| one.channel == last.channel);
