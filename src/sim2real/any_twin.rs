@@ -100,6 +100,10 @@ impl<T: Twin> Simulator for Kind<T> {
         self.0.resolution(self.own(recording), channel)
     }
 
+    fn scatter(&self, recording: &Recording<AnyStimulus>, channel: &str) -> f64 {
+        self.0.scatter(self.own(recording), channel)
+    }
+
     fn covariates(&self, recording: &Recording<AnyStimulus>) -> Vec<Covariate> {
         self.0.covariates(self.own(recording))
     }
@@ -201,6 +205,10 @@ impl Simulator for AnyTwin {
 
     fn resolution(&self, recording: &Recording<AnyStimulus>, channel: &str) -> f64 {
         self.0.resolution(recording, channel)
+    }
+
+    fn scatter(&self, recording: &Recording<AnyStimulus>, channel: &str) -> f64 {
+        self.0.scatter(recording, channel)
     }
 
     fn covariates(&self, recording: &Recording<AnyStimulus>) -> Vec<Covariate> {

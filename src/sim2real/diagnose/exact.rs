@@ -49,6 +49,7 @@ pub(super) fn by_a_rule<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothes
     (inquiry.twin.parameters().len()..fit.values.len()).filter(|k| !moves(k)).collect()
 }
 
-fn is_exact<T: Twin>(inquiry: &Inquiry<'_, T>, channel: &str) -> bool {
+/// Whether a channel knows no noise.
+pub(super) fn is_exact<T: Twin>(inquiry: &Inquiry<'_, T>, channel: &str) -> bool {
     inquiry.twin.channels().iter().any(|known| known.exact && known.name == channel)
 }

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 
+use super::exact::is_exact;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
-use super::whiteness;
+use super::whiteness::{self, ChannelMisfit};
 use crate::sim2real::identify::{Block, Fit, Problem, State};
 use crate::sim2real::{Clock, Covariate, Measured, Part, Recording, Twin};
 
@@ -20,7 +21,8 @@ const FOLLOWED: f64 = 2.0;
 /// The part of the recalibrated misfit above the noise that is left: of the channel in which most is left.
 ///
 /// Where rows are messages the misfit is taken about its mean: a constant cost is something that any simulator can be
-/// given, and no measure of what was explained.
+/// given, and no measure of what was explained. How much noise messages have nobody knows but where a channel is exact: of what is left
+/// elsewhere that counts which depends on something.
 pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> f64 {
     let blocks = inquiry.problem(inquiry.twin, &inquiry.evidence.compared).blocks();
     let about_mean = inquiry.twin.clock() == Clock::Event;
@@ -35,9 +37,19 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
             let sum: f64 = whiteness::of_channel(residual, &blocks, &first.channel).iter().flat_map(|s| s.iter()).sum();
             let constant = if about_mean { sum * sum / count.max(1.0) } else { 0.0 };
             let misfit = first.sum_of_squares - constant - last.level * count;
-            (misfit > (NEAR_THE_NOISE - 1.0) * last.level * count).then(|| last.above(last.level) / misfit)
+            (misfit > (NEAR_THE_NOISE - 1.0) * last.level * count).then(|| left(inquiry, selection, last) / misfit)
         })
         .fold(0.0, f64::max)
+}
+
+/// What is left of a channel that the selected twin leaves like that.
+fn left<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, last: &ChannelMisfit) -> f64 {
+    let above = last.above(last.level);
+    if inquiry.twin.clock() != Clock::Event || is_exact(inquiry, &last.channel) {
+        return above;
+    }
+    let explained = dependences(inquiry, &selection.selected, |channel| channel == last.channel).map(|d| d.explained);
+    explained.sum::<f64>().min(above)
 }
 
 /// Whether `fit`, that of `selected` in free run, leaves no more than about the noise.
@@ -48,21 +60,31 @@ pub(super) fn followed<T>(fit: &Fit, selected: &Hypothesis<T>) -> bool {
 
 /// What the remaining residuals of messages depend on most.
 pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
-    // Below the noise there is nothing to explain, however regular it is: rounding of the arithmetic is regular too.
-    if inquiry.twin.clock() != Clock::Event || selected.within(NEAR_THE_NOISE) {
+    if inquiry.twin.clock() != Clock::Event {
         return None;
     }
+    // Below what numbers are rounded to there is nothing to explain, however regular it is: rounding is regular too.
+    let rounded = |channel: &str| {
+        let misfit = selected.misfits.iter().find(|misfit| misfit.channel == channel);
+        misfit.is_none_or(|misfit| misfit.within(NEAR_THE_NOISE, inquiry.evidence.rounding_of(channel)))
+    };
+    dependences(inquiry, selected, |channel| !rounded(channel)).max_by(|a, b| a.strength.total_cmp(&b.strength))
+}
+
+/// What the residuals of messages depend on most, one of each recording and each of those `channels`.
+fn dependences<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    selected: &Hypothesis<T>,
+    channels: impl Fn(&str) -> bool,
+) -> impl Iterator<Item = Dependence> {
     let parts = &inquiry.evidence.compared;
     let residual = selected.fit.residual.as_slice();
-    inquiry
-        .problem(&selected.twin, parts)
-        .blocks()
-        .iter()
-        .filter_map(|block| {
-            let covariates = inquiry.twin.covariates(parts[block.part].recording);
-            strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates)
-        })
-        .max_by(|a, b| a.strength.total_cmp(&b.strength))
+    let blocks = inquiry.problem(&selected.twin, parts).blocks().into_iter().filter(|block| channels(&block.channel));
+    let of = |block: Block| {
+        let covariates = inquiry.twin.covariates(parts[block.part].recording);
+        strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates)
+    };
+    blocks.filter_map(of).collect::<Vec<_>>().into_iter()
 }
 
 /// The part of what is left of sampled signals that the motion foretells on held-out data.

@@ -232,7 +232,8 @@ fn far_off(fit: &ChannelFit) -> bool {
 
 fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
     let floor = |times: f64| selection.selected.misfits.iter().all(|m| m.within(times, 1.0));
-    let left_over = structured(findings) && !selection.selected.within(HARDLY_ABOVE)
+    // Of messages it is known of which of them it is asked.
+    let left_over = structured(findings) && (!findings.sampled || !selection.selected.within(HARDLY_ABOVE))
         || findings.foretold > FORETOLD_WELL && !floor(HARDLY_ABOVE);
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);

@@ -20,10 +20,12 @@ const COMPLETES: f64 = 0.8;
 const MORE_THAN_NOISE: f64 = 0.15;
 /// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
 const INFORMATIVE_ROWS: usize = 25;
-/// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were.
+/// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were;
+/// or take away so much of what they are off by, all together, that no less than so many of them tell of it.
 const FEW_ROWS: usize = 4;
 const MOST: f64 = 0.8;
 const RESTORED: f64 = 0.2;
+const TAKEN_AWAY: f64 = 0.9;
 /// Residuals with an autocorrelation time below this [rows] are taken for white.
 const FAIRLY_WHITE: f64 = 2.0;
 /// What stands behind by more than this after a few steps is not followed further.
@@ -238,9 +240,24 @@ pub(super) fn needed<T: Twin>(
         (before - after).abs() > 1.0 && after.abs() < RESTORED * before.abs()
     });
     let restored = restored.count();
-    let seen = inquiry.twin.clock() == Clock::Event && restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64;
+    let few = restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64;
+    let pairs: Vec<[f64; 2]> = (0..rows).map(|i| [less.fit.residual[i], whole.fit.residual[i]]).collect();
+    let seen = inquiry.twin.clock() == Clock::Event && (few || takes_away(&pairs));
     let spread = rows > 40 * INFORMATIVE_ROWS && second * second >= INFORMATIVE_ROWS as f64 * fourth;
     enough && (spread || seen || moved >= INFORMATIVE_ROWS)
+}
+
+/// Whether of the messages that are moved, each off by so much before and after, nearly all that they were off by is gone, and more than a
+/// few tell of it: a limit that varies from order to order restores none of them exactly.
+fn takes_away(messages: &[[f64; 2]]) -> bool {
+    let moved = messages.iter().filter(|[before, after]| (before - after).abs() > 1.0);
+    let [mut before, mut after, mut fourth] = [0.0; 3];
+    for [was, is] in moved {
+        before += was * was;
+        after += is * is;
+        fourth += was.powi(4);
+    }
+    before > 0.0 && after <= (1.0 - TAKEN_AWAY) * before && before * before >= FEW_ROWS as f64 * fourth
 }
 
 /// `sum N_e ln(RSS0 / RSS1) - dk ln N_e`, with the effective number of residuals of the *alternative*: autocorrelated
@@ -330,6 +347,18 @@ mod tests {
         assert!(share_of(Clock::Event, 2) > 2.0 * share_of(sampled, 2), "it is not asked whether it carries over");
         assert!(share_of(sampled, 3) > share_of(Clock::Event, 2));
         assert!((share_of(Clock::Event, 3) - share_of(sampled, 3)).abs() < f64::EPSILON);
+    }
+
+    #[test]
+    fn few_messages_tell_of_a_limit_that_varies_and_one_large_one_does_not() {
+        let cut =
+            |varies: f64| -> Vec<[f64; 2]> { (0..12).map(|k| [-30.0 - k as f64, varies * (k as f64 - 5.5)]).collect() };
+        assert!(takes_away(&cut(1.5)), "none is restored to a fifth, all together are to a tenth");
+        assert!(!takes_away(&cut(3.5)), "too much is left");
+        let mut one = cut(1.0);
+        one.push([-900.0, 2.0]);
+        assert!(!takes_away(&one), "one of them is nearly all there is");
+        assert!(!takes_away(&[[-30.0, 0.0]; 3]) && takes_away(&[[-30.0, 0.0]; 4]) && !takes_away(&[]));
     }
 
     #[test]
