@@ -153,10 +153,16 @@ fn bench(c: &mut Criterion) {
     let mut group = c.benchmark_group("1,000,000 bars");
     group.throughput(Throughput::Elements(BARS as u64)).sample_size(20);
     group.bench_function("fused averages", |b| b.iter(|| fused(black_box(&closes))));
+    let run =
+        |strategy: Result<Box<dyn Strategy>, _>| strategy.ok().and_then(|mut strategy| backtest.run(strategy.as_mut()).ok());
+    group.bench_function("sma_cross backtest, in memory of its own", |b| {
+        b.iter_batched(|| strategies::build(&table), run, BatchSize::PerIteration);
+    });
+    // As a sweep runs one after the other.
     group.bench_function("sma_cross backtest", |b| {
         b.iter_batched(
             || strategies::build(&table),
-            |strategy| strategy.ok().and_then(|mut strategy| backtest.run(strategy.as_mut()).ok()),
+            |strategy| run(strategy).map(|record| backtest.recycle(record)),
             BatchSize::PerIteration,
         );
     });
@@ -181,7 +187,11 @@ fn bench_book(c: &mut Criterion) {
         });
     });
     group.bench_function("queue and 1 ms latency", |b| {
-        b.iter_batched(Quoter::default, |mut strategy| backtest.run(&mut strategy).ok(), BatchSize::PerIteration);
+        b.iter_batched(
+            Quoter::default,
+            |mut strategy| backtest.run(&mut strategy).ok().map(|record| backtest.recycle(record)),
+            BatchSize::PerIteration,
+        );
     });
     group.finish();
 }

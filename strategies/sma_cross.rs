@@ -82,8 +82,9 @@ impl SmaCross {
         let newest = bars.last()?.close.0;
         let leaving = |count: usize| bars.len().checked_sub(count + 1).map_or(0, |k| bars[k].close.0);
         // Sums of m and n closes are compared as n * fast and m * slow, without a division: what a bar changes of their difference.
-        let times = |count: usize, price: i64| count as i128 * i128::from(price);
-        averages.ahead += times(slow - fast, newest) - times(slow, leaving(fast)) + times(fast, leaving(slow));
+        // Prices are above 0, so that differences of two fit.
+        let times = |count: usize, price: i64| i128::from(count as i64) * i128::from(price);
+        averages.ahead += times(slow, newest - leaving(fast)) - times(fast, newest - leaving(slow));
         averages.bars += 1;
         if averages.bars < slow {
             return None;

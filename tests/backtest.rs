@@ -277,6 +277,32 @@ fn same_seed_same_bits() {
     assert_eq!(Metrics::of(&first).unwrap(), Metrics::of(&run(bars(&WALK), &parts, &plan)).unwrap());
 }
 
+/// Shorter runs and longer ones, with fewer orders and more: of what was there before nothing is left.
+#[test]
+fn a_run_in_the_memory_of_another_is_that_in_memory_of_its_own() {
+    let long: Vec<(f64, f64)> = (0..40).map(|k| (10.0 + f64::from(k % 7), 10.0 + f64::from(k % 5))).collect();
+    let plan: Vec<_> = (0..30).map(|k| (k, 0, if k % 3 == 0 { Side::Sell } else { Side::Buy }, 5.0)).collect();
+    let of = |bars: History| {
+        let parts = [("half_spread", "bps", 3.0), ("commission", "bps", 1.0)];
+        Backtest::new(vec![instrument("A")], vec![bars], venue(&parts), settings()).unwrap()
+    };
+    let whole = of(bars(&long));
+    let short = whole.on(vec![bars(&WALK)]).unwrap();
+    let alone = |bars: &[(f64, f64)], plan: &[_]| of(self::bars(bars)).run(&mut Plan::new(plan)).unwrap();
+    let again = |backtest: &Backtest, plan: &[_]| {
+        let record = backtest.run(&mut Plan::new(plan)).unwrap();
+        backtest.recycle(record.clone());
+        record
+    };
+    let first = again(&whole, &plan);
+    assert!(first.blotter.fills.len() > 10, "{}", first.blotter.fills.len());
+    assert_eq!(first, alone(&long, &plan));
+    assert_eq!(again(&short, &plan[..1]), alone(&WALK, &plan[..1]));
+    assert_eq!(again(&whole, &plan), first);
+    assert_eq!(again(&whole, &[]), alone(&long, &[]));
+    assert_eq!(again(&whole, &plan), first);
+}
+
 #[test]
 fn metrics_without_trades_are_defined_or_none() {
     let metrics = Metrics::of(&run(bars(&WALK), &[], &[])).unwrap();

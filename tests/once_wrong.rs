@@ -95,3 +95,28 @@ fn what_fits_windows_alone_does_not_displace_what_explains_a_free_run() {
     assert_eq!(names(&trial), ["hysteresis"]);
     assert_ne!(trial.verdict, Verdict::Unexplained);
 }
+
+/// A constant load on an axis that forgets nothing moves it as a sensor's drift would: of two that say the same, what is the same at
+/// all times is told first.
+#[test]
+fn what_never_changes_is_told_before_what_changes_with_time() {
+    let trial = tried(1007, 91);
+    assert_eq!(names(&trial), ["constant_load"]);
+    assert_eq!(trial.found[0].rivals.first().map(String::as_str), Some("drift"));
+    // Beside a payload that changes with time too.
+    assert_eq!(names(&tried(1003, 52)), ["constant_load", "payload_change"]);
+}
+
+/// An end stop that the fitted recording leaves no doubt of, and a held-out run that parts at a bounce, as the oracle's does.
+#[test]
+fn a_run_that_parts_at_a_bounce_does_not_unsay_an_end_stop() {
+    let trial = tried(1005, 47);
+    assert_eq!(names(&trial), ["end_stop"]);
+    assert_eq!(trial.verdict, Verdict::Ambiguous);
+}
+
+/// A supply that sags is no drift: what fits the recording with many doubts, and does worse on the other one, is not known.
+#[test]
+fn doubts_and_an_error_that_is_seen_elsewhere_are_something_unknown() {
+    assert_eq!(tried(1006, 11).verdict, Verdict::Unexplained);
+}

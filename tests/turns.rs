@@ -10,7 +10,9 @@ use std::path::Path;
 
 use command_scene::Folder;
 use serde_json::Value;
-use trueup::io::Table;
+use trueup::io::{RunFile, Table};
+use trueup::market::{prepare_run, streams_as_well};
+use trueup::strategies;
 
 /// A folder with the bars of the examples, and a run of them that was changed from one text to another.
 fn scene(changes: &[(&str, &str)]) -> Folder {
@@ -49,6 +51,41 @@ fn a_run_whose_data_are_streamed_is_the_same() {
     assert_eq!(one["metrics"], other["metrics"]);
     let error = scene(&[("[run]", "[run]\nstream = true")]).refused("backtest run.toml");
     assert!(error.contains("needs their `stamp` and their `interval`"), "{error}");
+}
+
+/// What goes through its data once reads them while it goes, wherever that takes nothing twice; what is told is what a run on data
+/// held in memory tells.
+#[test]
+fn a_run_through_its_data_is_that_of_data_in_memory() {
+    let spans = [("[run]", "[run]\nstart = \"2024-08-06T00:00:00Z\"\nend = \"2024-08-07T00:00:00Z\"")];
+    for changes in [&[][..], &spans] {
+        let scene = scene(changes);
+        let file = RunFile::read(scene.path("run.toml")).unwrap();
+        assert!(streams_as_well(&file));
+        let prepared = prepare_run(&file).unwrap();
+        let mut settings: toml::Table = file.strategy_settings().unwrap();
+        settings.insert("kind".to_owned(), file.strategy.clone().into());
+        let record = prepared.backtest.run(strategies::build(&settings).unwrap().as_mut()).unwrap();
+        let outputs = prepared.outputs(&record).unwrap();
+        // What lies behind its end is not read: that is all there is to tell them apart by.
+        let told = |mut summary: Value| {
+            if !changes.is_empty() {
+                summary.as_object_mut().unwrap().remove("data").unwrap();
+                summary["inputs"][1].as_object_mut().unwrap().remove("rows").unwrap();
+            }
+            summary
+        };
+        let whole = told(serde_json::from_str(&outputs.json().unwrap()).unwrap());
+        for threads in [1, 2] {
+            assert_eq!(told(scene.json(&format!("backtest run.toml --threads {threads} --out a{threads}"))), whole);
+            assert_eq!(Table::read(scene.path(&format!("a{threads}/equity.parquet"))).unwrap().rows(), record.equity.len());
+        }
+        let (code, text, _) = scene.run("backtest run.toml");
+        assert!(code == 0 && text.starts_with(&outputs.page.title[..20]), "{text}");
+    }
+    let csv = scene(&[("bars.parquet", "bars.csv")]);
+    fs::write(csv.path("bars.csv"), "ts,open,high,low,close,volume\n0,1,1,1,1,1\n60000000000,1,1,1,1,1\n").unwrap();
+    assert!(!streams_as_well(&RunFile::read(csv.path("run.toml")).unwrap()), "a text would be read twice");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 """What a step of an environment costs through Python: this package's, Gymnasium's, PufferLib's, gym-anytrading's, gym-trading-env's.
 
-    python python/benches/environments.py [--seconds 0.3] [--repeats 9]
+    python python/benches/environments.py [--seconds 0.3] [--repeats 9] [--only TITLE]
 
 Prints tables in Markdown: the median over the repeats of nanoseconds of processor time a step of one lane, with the quartiles, and each
 peer's median over that of this package. Those of a table take turns, so that all of them meet the same machine. Actions are drawn before
@@ -124,14 +124,50 @@ def choices() -> list[int]:
     return [int(way) for way in np.random.default_rng(0).integers(2, size=4096)]
 
 
-def targets(kind: Callable) -> list:
-    """Another position at most steps."""
-    return [kind(k) for k in np.random.default_rng(0).integers(3, size=4096)]
+#: One of two positions at each step: half of the steps turn it around.
+WAYS = [int(way) for way in np.random.default_rng(0).integers(2, size=4096)]
+
+
+def ways(kind: Callable) -> list:
+    """These positions, as an environment's actions."""
+    return [kind(way) for way in WAYS]
+
+
+def trade_env(**options):
+    """All of 5,000 bars as one episode, as the peers have it. What is held drifts with prices, which they do not trade: nor do shares within the
+    band."""
+    return gymnasium.make("trueup/Trade-v0", rows=peers.BARS, length=0, band=0.5, **options)
 
 
 def trade(**options) -> Run:
-    return single(gymnasium.make("trueup/Trade-v0", **options), targets(lambda k: np.array([k - 1], np.float32)))
+    return single(trade_env(**options), ways(lambda way: np.array([2 * way - 1], np.float32)))
 
+
+def turned() -> str:
+    """How often each market's position is another after a step, by what each tells of itself, in the first 2,000 steps of an episode."""
+    told = []
+    makers = [
+        ("trueup", trade_env, lambda env, info: info["orders"], lambda way: np.array([2 * way - 1], np.float32)),
+        ("gym-anytrading", peers.anytrading, lambda env, info: info["position"], int),
+        ("gym-trading-env", peers.trading_env, lambda env, info: info["position"], int),
+    ]
+    for name, make, position, kind in makers:
+        try:
+            env = make()
+        except peers.Missing:
+            continue
+        _, info = env.reset(seed=0)
+        before, turns = position(env, info), 0
+        for way in WAYS[:2000]:
+            *_, info = env.step(kind(way))
+            now = position(env, info)
+            turns += now != before
+            before = now
+        told.append(f"{name} {turns}")
+    return f"Of 2,000 steps by the same draws so many turn the position: {', '.join(told)}."
+
+
+MARKET = "One market of 5,000 bars, long or short by the same draws"
 
 TABLES: dict[str, list[tuple[str, int, Callable[[], Run]]]] = {
     "One cart-pole, by `gymnasium.make`": [
@@ -159,11 +195,11 @@ TABLES: dict[str, list[tuple[str, int, Callable[[], Run]]]] = {
         ("Gymnasium's own vector in NumPy", 16, lambda: in_numpy(16)),
         ("Gymnasium's `SyncVectorEnv`", 16, lambda: one_after_another(16)),
     ],
-    "One market of bars, another position at most steps": [
+    MARKET: [
         ("trueup/Trade-v0, without info", 1, lambda: trade(info=False)),
         ("trueup/Trade-v0, with twelve figures of info", 1, trade),
-        ("gym-anytrading's StocksEnv", 1, lambda: single(peers.anytrading(), targets(lambda k: int(k % 2)))),
-        ("gym-trading-env's TradingEnv", 1, lambda: single(peers.trading_env(), targets(int))),
+        ("gym-anytrading's StocksEnv", 1, lambda: single(peers.anytrading(), ways(int))),
+        ("gym-trading-env's TradingEnv", 1, lambda: single(peers.trading_env(), ways(int))),
     ],
 }
 
@@ -209,6 +245,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=0.3, help="processor time of a measurement [s]")
     parser.add_argument("--repeats", type=int, default=9)
+    parser.add_argument("--only", default="", help="the tables with this in their title")
     arguments = parser.parse_args()
     print("# Environments through Python, beside their peers\n")
     print("`./x environments` measures this anew. Nanoseconds of processor time a step of one lane, resets within; those of a table take turns.\n")
@@ -220,4 +257,7 @@ if __name__ == "__main__":
             continue
     print(f"{', '.join(versions)}, PufferLib {peers.PUFFER} (its cart-pole in C, built with the flags of its setup.py); {platform.machine()}.")
     for title, rows in TABLES.items():
-        table(title, rows, arguments.seconds, arguments.repeats)
+        if arguments.only in title:
+            table(title, rows, arguments.seconds, arguments.repeats)
+        if title == MARKET and arguments.only in title:
+            print(f"\n{turned()}")

@@ -117,27 +117,39 @@ class PufferCartPole:
         return self.observations, self.rewards, self.terminals, self.truncations, []
 
 
+#: Bars of the markets.
+BARS = 5_000
+
+
+def _bars():
+    """Bars of a random walk."""
+    import pandas as pd
+
+    rng = np.random.default_rng(0)
+    close = 100 * np.exp(np.cumsum(rng.normal(0, 1e-3, BARS)))
+    bars = {"open": close, "high": close * 1.001, "low": close * 0.999, "close": close, "volume": rng.uniform(1, 2, BARS)}
+    return pd.DataFrame(bars, index=pd.date_range("2024-01-01", periods=BARS, freq="h"))
+
+
 def anytrading():
-    """gym-anytrading's environment of stocks, on the prices it comes with."""
+    """gym-anytrading's environment of stocks."""
     try:
-        import gym_anytrading  # noqa: F401
-        from gym_anytrading.datasets import STOCKS_GOOGL
         from gym_anytrading.envs import StocksEnv
+
+        bars = _bars()
     except ImportError as error:
         raise Missing(f"it is not installed ({error})") from None
-    return StocksEnv(df=STOCKS_GOOGL, window_size=10, frame_bound=(10, len(STOCKS_GOOGL)))
+    table = bars.rename(columns=str.capitalize)
+    return StocksEnv(df=table, window_size=10, frame_bound=(10, len(table)))
 
 
 def trading_env():
-    """gym-trading-env's environment, on 5,000 bars of a random walk."""
+    """gym-trading-env's environment, long or short."""
     try:
-        import pandas as pd
         from gym_trading_env.environments import TradingEnv
+
+        table = _bars()
     except ImportError as error:
         raise Missing(f"it is not installed ({error})") from None
-    rng = np.random.default_rng(0)
-    close = 100 * np.exp(np.cumsum(rng.normal(0, 1e-3, 5000)))
-    bars = {"open": close, "high": close * 1.001, "low": close * 0.999, "close": close, "volume": rng.uniform(1, 2, 5000)}
-    table = pd.DataFrame(bars, index=pd.date_range("2024-01-01", periods=5000, freq="h"))
     table["feature_return"] = table["close"].pct_change().fillna(0.0)
-    return TradingEnv(df=table, positions=[-1, 0, 1], verbose=0)
+    return TradingEnv(df=table, positions=[-1, 1], verbose=0)

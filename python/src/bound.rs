@@ -1,8 +1,8 @@
 //! Lanes that step in place, on arrays of NumPy that were given once.
 
-use numpy::{Element, PyArrayDyn, PyArrayMethods};
+use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use trueup::rl::{Actions, Out};
+use trueup::rl::{Actions, Kept, Out};
 
 use crate::environment::{Lanes, drive, scattered};
 
@@ -43,6 +43,8 @@ impl BoundLanes {
         terminated: Py<PyArrayDyn<bool>>,
         truncated: Py<PyArrayDyn<bool>>,
     ) -> PyResult<Self> {
+        // Nobody is told of what was last.
+        lanes.borrow_mut(actions.py()).driven().keep(Kept::Nothing);
         let actions = if let Ok(real) = actions.extract() {
             ActionBuffer::Real(real)
         } else if let Ok(choice) = actions.extract() {
@@ -57,8 +59,17 @@ impl BoundLanes {
         Ok(Self { lanes, actions, observations, rewards, terminated, truncated })
     }
 
-    /// Takes a step by the actions there are in their array, and writes what comes of it into the others.
-    fn step(&mut self, py: Python<'_>) -> PyResult<()> {
+    /// Takes a step by the actions there are in their array, into which `given` ones are written before, and writes what comes of it into the
+    /// others.
+    #[pyo3(signature = (given=None))]
+    fn step(&mut self, py: Python<'_>, given: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        if let Some(given) = given {
+            match &self.actions {
+                ActionBuffer::Real(own) => take(given, own)?,
+                ActionBuffer::Choice(own) => take(given, own)?,
+                ActionBuffer::ShortChoice(own, _) => take(given, own)?,
+            }
+        }
         let actions = match &mut self.actions {
             ActionBuffer::Real(real) => Actions::Continuous(read(py, real)?),
             ActionBuffer::Choice(choice) => Actions::Discrete(read(py, choice)?),
@@ -87,6 +98,26 @@ impl BoundLanes {
         }
         Ok(())
     }
+}
+
+/// Writes `given` actions into `own` array: those that lie there as they are asked for without a word to NumPy, which takes longer to see that
+/// than a step does.
+fn take<T: Element + Copy>(given: &Bound<'_, PyAny>, own: &Py<PyArrayDyn<T>>) -> PyResult<()> {
+    let own = own.bind(given.py());
+    if let Ok(array) = given.cast_exact::<PyArrayDyn<T>>()
+        && array.shape() == own.shape()
+        && array.is_c_contiguous()
+    {
+        let (from, to, bytes) = (array.data() as usize, own.data() as usize, own.len() * size_of::<T>());
+        if from == to {
+            return Ok(());
+        }
+        if from.abs_diff(to) >= bytes {
+            written(given.py(), own.as_unbound())?.copy_from_slice(read(given.py(), array.as_unbound())?);
+            return Ok(());
+        }
+    }
+    own.set_item(given.py().Ellipsis(), given)
 }
 
 /// What is in an array.

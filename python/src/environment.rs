@@ -12,7 +12,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyString, PyTuple};
 use trueup::io::hint_among;
 use trueup::market::env::make_on;
-use trueup::rl::{Actions, AutoresetMode, Checked, EnvEntry, EnvError, Out, Threads, VecEnv, Which};
+use trueup::rl::{Actions, AutoresetMode, Checked, EnvEntry, EnvError, Kept, Out, Threads, VecEnv, Which};
 
 use crate::about::about;
 use crate::error;
@@ -53,7 +53,12 @@ pub struct Lanes {
     /// Whether its steps give info, and under which names.
     informs: bool,
     names: PyOnceLock<Vec<Py<PyString>>>,
+    /// What makes an array of an action that is no plain one.
+    reader: Option<Py<PyAny>>,
 }
+
+/// Numbers of an action that are read one by one: more are borrowed as a whole, which takes as long as some dozen of them.
+const FEW: usize = 8;
 
 impl Lanes {
     fn of(driver: Driver) -> Self {
@@ -68,6 +73,7 @@ impl Lanes {
             row: vec![0.0; size],
             informs: true,
             names: PyOnceLock::new(),
+            reader: None,
         }
     }
 
@@ -84,11 +90,35 @@ impl Lanes {
         }
     }
 
-    /// Whether an action is an array that can be read as it is.
-    fn is_row(&self, action: &Bound<'_, PyAny>) -> bool {
-        let array = action.cast_exact::<PyArrayDyn<f32>>();
-        let shape = &self.shapes[1];
-        array.is_ok_and(|array| !shape.is_empty() && array.shape() == shape.as_slice() && array.is_c_contiguous())
+    /// A step by the action of a single environment: a choice, an array that can be read as it is, or whatever the reader makes an array
+    /// of.
+    fn stepped_by(&mut self, py: Python<'_>, action: &Bound<'_, PyAny>, out: &mut Out<'_>) -> PyResult<()> {
+        if let Some(choice) = plain(action) {
+            return drive(py, self.driven(), |driver| driver.step(Actions::Discrete(&[choice]), out));
+        }
+        if let Ok(array) = action.cast_exact::<PyArrayDyn<f32>>()
+            && !self.shapes[1].is_empty()
+            && array.shape() == self.shapes[1].as_slice()
+        {
+            let count = array.len();
+            if let [_] = self.shapes[1][..]
+                && count <= FEW
+            {
+                let mut few = [0.0; FEW];
+                (0..count).for_each(|k| few[k] = array.get_owned(&[k][..]).unwrap_or(f32::NAN));
+                return drive(py, self.driven(), |driver| driver.step(Actions::Continuous(&few[..count]), out));
+            }
+            if array.is_c_contiguous() {
+                return self.stepped(py, action, out);
+            }
+        }
+        match &self.reader {
+            Some(reader) => {
+                let actions = reader.call1(py, (action,))?;
+                self.stepped(py, actions.bind(py), out)
+            }
+            None => self.stepped(py, action, out),
+        }
     }
 
     fn looked_at(&self) -> MutexGuard<'_, Driver> {
@@ -98,6 +128,11 @@ impl Lanes {
     pub fn driven(&mut self) -> &mut Driver {
         self.driver.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// What is kept of episodes that end.
+fn kept(informs: bool) -> Kept {
+    if informs { Kept::All } else { Kept::Observations }
 }
 
 /// The choice that an action is, if it is one whole number: of Python or of NumPy.
@@ -210,25 +245,12 @@ impl Lanes {
     }
 
     /// A step of a single environment: what is observed, in an array of its own, the reward, terminated, truncated, and info by name.
-    /// `read` makes an array of an action that is no plain one.
-    fn step_one<'py>(
-        &mut self,
-        py: Python<'py>,
-        action: &Bound<'py, PyAny>,
-        read: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyTuple>> {
+    fn step_one<'py>(&mut self, py: Python<'py>, action: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
         let (mut reward, mut terminated, mut truncated) = ([0.0], [false], [false]);
         let mut row = std::mem::take(&mut self.row);
         let mut out =
             Out { observations: &mut row, rewards: &mut reward, terminated: &mut terminated, truncated: &mut truncated };
-        let done = if let Some(choice) = plain(action) {
-            drive(py, self.driven(), |driver| driver.step(Actions::Discrete(&[choice]), &mut out))
-        } else if self.is_row(action) {
-            self.stepped(py, action, &mut out)
-        } else {
-            read.call1((action,)).and_then(|actions| self.stepped(py, &actions, &mut out))
-        };
-        let told = done.and_then(|()| {
+        let told = self.stepped_by(py, action, &mut out).and_then(|()| {
             let observed = PyArray1::from_slice(py, &row);
             let info = self.info_of_one(py)?;
             let shape = &self.shapes[0];
@@ -240,13 +262,21 @@ impl Lanes {
         told
     }
 
+    /// What makes an array of an action that is no plain one.
+    #[setter]
+    fn set_reader(&mut self, reader: Py<PyAny>) {
+        self.reader = Some(reader);
+    }
+
     /// Info of a single environment, by name.
     fn info_of_one<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let info = PyDict::new(py);
+        if !self.informs {
+            return Ok(info);
+        }
         let driver = self.looked_at();
-        let names = self.names.get_or_init(py, || match self.informs {
-            false => Vec::new(),
-            true => driver.about().info.iter().map(|channel| PyString::intern(py, &channel.name).unbind()).collect(),
+        let names = self.names.get_or_init(py, || {
+            driver.about().info.iter().map(|channel| PyString::intern(py, &channel.name).unbind()).collect()
         });
         for (channel, name) in names.iter().enumerate() {
             let mut value = [0.0];
@@ -301,10 +331,11 @@ impl Lanes {
         Ok(PyArray2::from_vec2(py, &rows)?)
     }
 
-    /// Whether steps of a single environment give info.
+    /// Whether steps give info.
     #[setter]
     fn set_informs(&mut self, informs: bool) {
-        (self.informs, self.names) = (informs, PyOnceLock::new());
+        self.informs = informs;
+        self.driven().keep(kept(informs));
     }
 
     /// The same lanes once more, which go on with the same bits.
@@ -314,7 +345,9 @@ impl Lanes {
 
     /// Goes on as `other`.
     fn load(&mut self, other: &Self) {
-        *self = Self { informs: self.informs, ..other.copy() };
+        *self = Self { informs: self.informs, reader: self.reader.take(), ..other.copy() };
+        let informs = self.informs;
+        self.driven().keep(kept(informs));
     }
 
     /// Makes lane `to` a copy of lane `from`.

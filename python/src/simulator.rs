@@ -264,7 +264,7 @@ impl ScriptedSimulator {
     ) -> PyResult<Self> {
         let candidate = |(id, parameters): (String, Vec<ParameterRow>)| {
             let form = Form { name: "", parameters: parameters.into_iter().map(parameter).collect() };
-            Ok(Candidate { about: about(py, &id)?, form, form_index: 0, finishing: false, general: false })
+            Ok(Candidate { about: about(py, &id)?, form, form_index: 0, finishing: false, general: false, ages: false })
         };
         let parameters: Vec<Parameter> = parameters.into_iter().map(parameter).collect();
         let initial = initial.into_iter().map(|(name, unit, value, channel, derivative, std)| Initial {

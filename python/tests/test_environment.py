@@ -368,3 +368,44 @@ def test_info_can_be_left_out():
     silent.restore(told.snapshot())
     assert silent.step(action)[4] == {} and pickle.loads(pickle.dumps(silent)).reset(seed=3)[1] == {}
     assert silent.branch().step(action)[4] == {} and copy.deepcopy(told).step(action)[4]["steps"] == 2
+
+
+def test_a_subclass_may_have_a_step_of_its_own():
+    class Doubled(envs.Environment):
+        def step(self, action):
+            observation, reward, *rest = super().step(action)
+            return observation, 2 * reward, *rest
+
+    ours, theirs = Doubled(CART_POLE), envs.make(CART_POLE)
+    ours.reset(seed=1), theirs.reset(seed=1)
+    assert ours.step(0)[1] == 2 * theirs.step(0)[1]
+    assert copy.deepcopy(ours).step(0)[1] == 2 * theirs.step(0)[1]
+    again = pickle.loads(pickle.dumps(theirs))
+    again.reset(seed=1)
+    assert again.step(1)[1] == 1.0
+
+
+@pytest.mark.parametrize("identity", IDS)
+def test_an_env_config_makes_them_as_rllib_does(identity):
+    # A worker is handed the config by a pickle, makes its environment, and copies it.
+    config = pickle.loads(pickle.dumps({"id": identity, "info": False}))
+    env = envs.from_config(config)
+    assert config == {"id": identity, "info": False}
+    assert played(copy.deepcopy(env), 20, seed=2) == played(pickle.loads(pickle.dumps(env)), 20, seed=2)
+    # What cannot be sent to a worker is no option either: it is said where it is written.
+    with pytest.raises(trueup.InputError, match="a number, a truth value or a text"):
+        envs.from_config({"id": identity, "reward": lambda: 0})
+
+
+def test_data_that_end_in_the_midst_of_an_episode_truncate_it():
+    env = envs.make("trueup/Trade-v0", rows=40, length=0, warm_up=8)
+    env.reset(seed=0)
+    for steps in range(1, 100):
+        observation, _, terminated, truncated, info = env.step(np.array([steps % 2], np.float32))
+        assert env.observation_space.contains(observation)
+        if terminated or truncated:
+            break
+    assert (terminated, truncated, info["ended"]) == (False, True, 3.0) and steps == info["steps"] < 40
+    with pytest.raises(trueup.InputError, match="is over"):
+        env.step(np.array([0.0], np.float32))
+    assert env.reset()[1]["steps"] == 0

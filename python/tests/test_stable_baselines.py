@@ -87,6 +87,7 @@ def test_steps_are_as_stable_baselines_wants_them(adapter):
 def test_attributes_and_methods_are_those_of_the_vector(adapter):
     ours = adapter(CART_POLE, 3)
     assert ours.get_attr("num_envs") == [3, 3, 3] and ours.get_attr("num_envs", indices=0) == [3]
+    assert ours.get_attr("num_envs", indices=np.int64(0)) == [3]
     assert ours.env_is_wrapped(object) == [False] * 3 and ours.env_is_wrapped(object, indices=[1]) == [False]
     ours.set_attr("note", "x")
     assert ours.get_attr("note") == ["x"] * 3
@@ -95,3 +96,29 @@ def test_attributes_and_methods_are_those_of_the_vector(adapter):
     ours.reset()
     assert len(ours.env_method("privileged")) == 3
     ours.close()
+
+
+@pytest.mark.skipif(importlib.util.find_spec("stable_baselines3") is None, reason="it is not installed")
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    ("algorithm", "identity"),
+    [("PPO", CART_POLE), ("A2C", "trueup/Pendulum-v0"), ("DQN", CART_POLE), ("SAC", "trueup/Trade-v0")],
+)
+def test_its_learners_learn_in_them(algorithm, identity, tmp_path):
+    import stable_baselines3
+    from stable_baselines3.common.env_checker import check_env
+    from stable_baselines3.common.evaluation import evaluate_policy
+    from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+
+    adapter = importlib.import_module("trueup.envs.stable_baselines").StableBaselines
+    balance = algorithm == "PPO"
+    arguments = {"n_steps": 64, "batch_size": 256, "n_epochs": 10, "learning_rate": 1e-3} if balance else {}
+    model = getattr(stable_baselines3, algorithm)("MlpPolicy", VecMonitor(adapter(identity, 16)), seed=0, device="cpu", **arguments)
+    model.learn(40_000 if balance else 2_000)
+    assert model.num_timesteps >= 2_000 and (identity != CART_POLE or len(model.ep_info_buffer) > 5)
+    mean, _ = evaluate_policy(model, VecMonitor(adapter(identity, 4)), n_eval_episodes=8)
+    assert mean > 200 if balance else np.isfinite(mean)
+    model.save(tmp_path / "model")
+    again = getattr(stable_baselines3, algorithm).load(tmp_path / "model", env=VecNormalize(adapter(identity, 16)), device="cpu")
+    again.learn(500)
+    check_env(envs.make(identity))

@@ -304,3 +304,84 @@ def test_bound_buffers_are_read_and_written_in_place():
     ]:
         with pytest.raises(trueup.InputError, match=name):
             envs.BoundEnvironment(CART_POLE, lanes, **{name: wrong})
+
+
+def test_bound_buffers_answer_to_whatever_is_in_them():
+    bound = envs.BoundEnvironment(CART_POLE, 3)
+    with pytest.raises(trueup.InputError, match="has not been reset"):
+        bound.step()
+    twin = envs.BoundEnvironment(CART_POLE, 3)
+    bound.reset(seed=2), twin.reset(seed=2)
+    kept = bound.observations.copy()
+    for wrong in ([0, 1, 2], [0, -1, 1], [2**40, 0, 0]):
+        bound.actions[:] = wrong
+        with pytest.raises(trueup.InputError, match="lane") as error:
+            bound.step()
+        assert error.value.hint and np.array_equal(bound.observations, kept)
+    assert np.array_equal(bound.step([0, 1, 0])[0], twin.step([0, 1, 0])[0])
+    # Actions are given in any form that NumPy writes into an array, views of the buffer itself among them.
+    for given in ([1, 0, 1], np.array([1, 1, 0]), np.array([0, 1, 1], np.int32), np.array([1, 9, 0, 9, 1])[::2], 1, bound.actions, bound.actions[::-1]):
+        twin.actions[...] = np.array(given)
+        assert np.array_equal(bound.step(given)[0], twin.step()[0]) and np.array_equal(bound.actions, twin.actions)
+    long = np.zeros(4, np.int64)
+    within = envs.BoundEnvironment(CART_POLE, 3, actions=long[:3])
+    within.reset(seed=2)
+    long[:] = [0, 1, 1, 0]
+    assert len(within.step(long[1:])[0]) == 3 and long.tolist() == [1, 1, 0, 0]
+    for given in (np.zeros(2, np.int64), "x", {}, np.zeros((2, 3))):
+        with pytest.raises((TypeError, ValueError)):
+            bound.step(given)
+    real = envs.BoundEnvironment("trueup/Pendulum-v0", 2)
+    real.reset(seed=0)
+    for wrong in (np.nan, np.inf, 3.0):
+        real.actions[1] = wrong
+        with pytest.raises(trueup.InputError, match="lane 1"):
+            real.step()
+    real.actions[:] = 0.5
+    real.step()
+    bound.close()
+    for call in (bound.step, lambda: bound.reset(seed=0)):
+        with pytest.raises(trueup.InputError, match="closed"):
+            call()
+
+
+def test_info_of_ends_can_be_left_out_and_changes_nothing_else():
+    told, silent = (envs.make_vec("trueup/Servo-v0", 3, autoreset_mode="SameStep", info=info, max_steps=5) for info in (True, False))
+    told.reset(seed=1), silent.reset(seed=1)
+    for actions in actions_of(told, 12):
+        ours, theirs = told.step(actions), silent.step(actions)
+        assert all(np.array_equal(a, b) for a, b in zip(ours[:4], theirs[:4], strict=True))
+        if "final_obs" in ours[4]:
+            assert all(np.array_equal(a, b) for a, b in zip(ours[4]["final_obs"], theirs[4]["final_obs"], strict=True))
+            assert len(ours[4]["final_info"]) > 2 and theirs[4]["final_info"] == {}
+    # A snapshot of one goes on in the other, which stays as it was made.
+    silent.restore(told.snapshot()), told.restore(silent.snapshot())
+    for actions in actions_of(told, 12):
+        ours, theirs = told.step(actions), silent.step(actions)
+        assert np.array_equal(ours[0], theirs[0])
+        if "final_obs" in ours[4]:
+            assert len(ours[4]["final_info"]) > 2 and theirs[4]["final_info"] == {}
+
+
+@pytest.mark.parametrize("identity", IDS)
+@pytest.mark.parametrize("vectorization", [None, "sync", "async"])
+def test_gymnasiums_own_vectors_and_wrappers_go_around_them(identity, vectorization):
+    from gymnasium.wrappers.vector import ClipReward, NormalizeObservation, RecordEpisodeStatistics
+
+    if vectorization == "async" and identity not in (CART_POLE, "trueup/Trade-v0"):
+        pytest.skip("processes are started for two of them")
+    made = gymnasium.make_vec(identity, 3, vectorization_mode=vectorization)
+    env = NormalizeObservation(ClipReward(RecordEpisodeStatistics(made), -1.0, 1.0))
+    first, _ = env.reset(seed=4)
+    again = [first.tobytes()]
+    env.action_space.seed(0)
+    for _ in range(30):
+        observations, rewards, terminated, truncated, info = env.step(env.action_space.sample())
+        assert observations.shape[0] == 3 and np.isfinite(observations).all() and (np.abs(rewards) <= 1).all()
+        again.append(observations.tobytes())
+    env.close()
+    if vectorization == "sync":
+        own = NormalizeObservation(ClipReward(RecordEpisodeStatistics(gymnasium.make_vec(identity, 3)), -1.0, 1.0))
+        assert own.reset(seed=4)[0].tobytes() == again[0]
+        own.action_space.seed(0)
+        assert [own.step(own.action_space.sample())[0].tobytes() for _ in range(30)] == again[1:]

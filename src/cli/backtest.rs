@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::io::{InputError, OutputFolder, Overwrite, RunFile, hint_among};
-use crate::market::{Instrument, RunOutputs, Strategy, prepare_run, prepare_streaming_run};
+use crate::market::{Instrument, RunBrief, RunOutputs, Strategy, prepare_run, prepare_streaming_run, streams_as_well};
+use crate::report::Metric;
 use crate::report::quantity::UNDEFINED;
 use crate::strategies::{self, StrategyError};
 
@@ -63,7 +64,9 @@ impl Run {
             draws::check(&file)?;
         }
         self.turn.check_free(overwrite)?;
-        let prepared = if file.run.stream { prepare_streaming_run(&file)? } else { prepare_run(&file)? };
+        // What goes through its data once need not hold them, where to read them twice costs next to nothing.
+        let once = self.draws.is_none() && self.turn.is_none() && streams_as_well(&file);
+        let prepared = if file.run.stream || once { prepare_streaming_run(&file)? } else { prepare_run(&file)? };
         let progress = screen.progress();
         let going = Going { file: &file, prepared: &prepared, progress: &progress, strategy: &|| strategy(&file) };
         let (record, beside) = match self.turn.run(&going, overwrite)? {
@@ -79,6 +82,9 @@ impl Run {
             None => None,
         };
         drop(progress);
+        if self.out.is_none() && drawn.is_none() && beside.is_none() {
+            return self.tell(&prepared.brief(&record).map_err(|error| Stop::Bug(error.to_string()))?, screen);
+        }
         let shown = |record| prepared.outputs(record).map_err(|error| Stop::Bug(error.to_string()));
         let mut outputs = shown(&record)?;
         if let Some(drawn) = &drawn {
@@ -86,7 +92,7 @@ impl Run {
         }
         let mut text = match &beside {
             _ if self.json => outputs.json()?,
-            None => told(&outputs, screen) + &draws::told(&outputs, screen),
+            None => told(&outputs.page.title, &outputs.page.metrics, screen) + &draws::told(&outputs, screen),
             Some(beside) => {
                 let told = told_beside(&shown(beside)?, &outputs, screen);
                 format!("{}\n\n{told}", screen.wrapped("", &self.turn.instead_of_what()))
@@ -101,13 +107,25 @@ impl Run {
                     text += &screen::written(&paths);
                 }
             }
-            None if !self.json => text += "\nNothing was written; --out DIR writes tables and a report.\n",
+            None if !self.json => text += NOTHING_WRITTEN,
             None => {}
         }
         screen.print(&text)?;
         Ok(Outcome::Done)
     }
+
+    /// Tells of a run of which nothing is written.
+    fn tell(&self, brief: &RunBrief, screen: &Screen) -> Result<Outcome, Stop> {
+        let text = match self.json {
+            true => brief.summary.json()?,
+            false => told(&brief.title, &brief.metrics, screen) + NOTHING_WRITTEN,
+        };
+        screen.print(&text)?;
+        Ok(Outcome::Done)
+    }
 }
+
+const NOTHING_WRITTEN: &str = "\nNothing was written; --out DIR writes tables and a report.\n";
 
 /// The strategy that `file` names.
 ///
@@ -154,12 +172,12 @@ pub(super) fn explained_strategy(file: &RunFile, error: &StrategyError) -> Input
 }
 
 /// The figures of a run.
-pub(super) fn told(outputs: &RunOutputs, screen: &Screen) -> String {
+pub(super) fn told(title: &str, metrics: &[Metric], screen: &Screen) -> String {
     let mut table = screen.table(["figure", ">value"]);
-    for metric in &outputs.page.metrics {
+    for metric in metrics {
         table.add_row([metric.name.clone(), metric.value.clone().unwrap_or_else(|| UNDEFINED.to_owned())]);
     }
-    format!("{}\n\n{}\n", screen.wrapped("", &outputs.page.title), table.trim_fmt())
+    format!("{}\n\n{}\n", screen.wrapped("", title), table.trim_fmt())
 }
 
 /// The figures of a run and of its fork.

@@ -79,6 +79,11 @@ pub(super) struct Going<'a> {
 }
 
 impl Turn {
+    /// Whether the run goes through from its beginning to its end, once.
+    pub fn is_none(&self) -> bool {
+        self.save.is_none() && self.resume.is_none() && self.fork.is_none()
+    }
+
     /// Refuses now what would be refused after a long run.
     pub fn check_free(&self, overwrite: Overwrite) -> Result<(), InputError> {
         let Some(path) = &self.save else { return Ok(()) };

@@ -249,7 +249,7 @@ fn ended(
     written: &[PathBuf],
     screen: &Screen,
 ) -> String {
-    let mut text = told(outputs, screen);
+    let mut text = told(&outputs.page.title, &outputs.page.metrics, screen);
     text += &why
         .map_or_else(|| "\nThe session goes on.\n".to_owned(), |why| format!("\nThe session has ended: {}.\n", why.words()));
     let limits = [Reason::OrderLimit, Reason::PositionLimit, Reason::OrderRate];

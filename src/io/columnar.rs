@@ -8,13 +8,14 @@ use std::sync::Arc;
 
 use chrono::{DateTime, NaiveDateTime};
 use polars::prelude::{
-    ArrowDataType, ArrowSchema, DataFrame, DataType, FileMetadata, IdxSize, IpcReader, ParquetReader, PolarsResult,
-    SerReader, Series, TimeUnit as PolarsUnit, TimeZone, polars_ensure,
+    ArrowDataType, ArrowSchema, ChunkedArray, DataFrame, DataType, FileMetadata, IpcReader, ParquetReader,
+    PolarsNumericType, PolarsResult, SerReader, Series, TimeUnit as PolarsUnit, TimeZone, polars_ensure,
 };
 
 use super::arrow_buffers::buffers_agree;
 use super::error::InputError;
 use super::parquet_pages::{footer_agrees, pages_agree};
+use super::table::Rows;
 
 /// The values of one column, in the few types that recordings are made of.
 pub(super) enum Column {
@@ -47,12 +48,12 @@ pub(super) enum Container {
 }
 
 impl ColumnarFile {
-    /// Reads `file`, which was opened from `path`.
+    /// Reads `file`, which was opened from `path`: all columns of it, or those `only`.
     ///
     /// # Errors
     /// A file that is empty, truncated or corrupt.
-    pub(super) fn read(path: &Path, file: File, container: Container) -> Result<Self, InputError> {
-        caught(path, container, || load(file, container))
+    pub(super) fn read(path: &Path, file: File, container: Container, only: Option<&[String]>) -> Result<Self, InputError> {
+        caught(path, container, || load(file, container, only))
     }
 
     /// The rows of `frame` as a table of the file whose columns are `columns`.
@@ -68,13 +69,17 @@ impl ColumnarFile {
         self.frame.height()
     }
 
-    /// The values of the column of that name, which the file must have, in all of its rows or in those `only`.
-    pub(super) fn column(&self, name: &str, only: Option<&[IdxSize]>) -> Column {
+    /// The values of the column of that name, which the file must have, in those `rows`.
+    pub(super) fn column(&self, name: &str, rows: &Rows) -> Column {
         if let Some((_, kind)) = self.left_out.iter().find(|(left_out, _)| left_out == name) {
             return Column::Other(kind.clone());
         }
         let series = self.frame.column(name).map(|column| column.as_materialized_series());
-        let of_rows = series.and_then(|series| only.map_or(Ok(series.clone()), |only| series.take_slice(only)));
+        let of_rows = series.and_then(|series| match rows {
+            Rows::All => Ok(series.clone()),
+            Rows::Span(first, end) => Ok(series.slice(*first as i64, end - first)),
+            Rows::Chosen(rows) => series.take_slice(rows),
+        });
         match of_rows.and_then(|series| values(&series)) {
             Ok(column) => column,
             Err(error) => Column::Other(first_line(&error.to_string())),
@@ -141,17 +146,18 @@ fn first_line(text: &str) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
-fn load(mut file: File, container: Container) -> PolarsResult<ColumnarFile> {
+fn load(mut file: File, container: Container, only: Option<&[String]>) -> PolarsResult<ColumnarFile> {
     match container {
         Container::Parquet => {
             let (size, mut again) = (file.metadata()?.len(), file.try_clone()?);
             check_footer(&mut again, size)?;
             let mut reader = ParquetReader::new(file);
-            let columns = Columns::of(&*reader.schema()?);
+            let mut columns = Columns::of(&*reader.schema()?);
+            columns.wanted.retain(|name| only.is_none_or(|only| only.contains(name)));
             let footer = Arc::clone(reader.get_metadata()?);
             check_rows(&footer)?;
             for group in 0..footer.row_groups.len() {
-                check_group(&footer, group, &mut again, size)?;
+                check_group(&footer, group, &columns, &mut again, size)?;
             }
             Ok(ColumnarFile::of(reader.with_columns(Some(columns.wanted.clone())).finish()?, &columns))
         }
@@ -196,21 +202,35 @@ pub(super) fn check_rows(footer: &FileMetadata) -> PolarsResult<()> {
     Ok(())
 }
 
-/// Holds the counts of row group `group` of a Parquet footer and those of the page headers to agree with each other and
-/// with the size of the file [bytes].
-pub(super) fn check_group(footer: &FileMetadata, group: usize, file: &mut File, size: u64) -> PolarsResult<()> {
+/// Holds the counts of row group `group` of a Parquet footer and those of the page headers of wanted columns to agree with each
+/// other and with the size of the file [bytes].
+pub(super) fn check_group(
+    footer: &FileMetadata,
+    group: usize,
+    columns: &Columns,
+    file: &mut File,
+    size: u64,
+) -> PolarsResult<()> {
     let Some(group) = footer.row_groups.get(group) else { return Ok(()) };
     for chunk in group.parquet_columns() {
+        let name = chunk.descriptor().path_in_schema.first();
+        if name.is_some_and(|name| !columns.wanted.iter().any(|wanted| wanted == name.as_str())) {
+            continue;
+        }
         // A column of lists has more values than rows.
         let flat = chunk.descriptor().descriptor.max_rep_level == 0;
         let range = chunk.byte_range();
         let fits = range.start <= range.end && range.end <= size;
         let counted = !flat || usize::try_from(chunk.num_values()) == Ok(group.num_rows());
         polars_ensure!(fits && counted, ComputeError: "its footer contradicts its size");
-        let mut bytes = Vec::new();
-        file.seek(SeekFrom::Start(range.start))?;
-        file.take(range.end - range.start).read_to_end(&mut bytes)?;
-        polars_ensure!(pages_agree(&bytes, chunk.num_values()), ComputeError: "its pages contradict its footer");
+        let read = |at: u64, most: u64| -> PolarsResult<Vec<u8>> {
+            let mut bytes = Vec::new();
+            file.seek(SeekFrom::Start(range.start + at))?;
+            Read::by_ref(file).take(most).read_to_end(&mut bytes)?;
+            Ok(bytes)
+        };
+        let agree = pages_agree(range.end - range.start, chunk.num_values(), read)?;
+        polars_ensure!(agree, ComputeError: "its pages contradict its footer");
     }
     Ok(())
 }
@@ -249,10 +269,10 @@ fn readable(kind: &ArrowDataType) -> bool {
 
 fn values(series: &Series) -> PolarsResult<Column> {
     Ok(match series.dtype() {
-        DataType::Float64 => Column::Floats(series.f64()?.iter().collect()),
+        DataType::Float64 => Column::Floats(cells(series.f64()?)),
         DataType::Float32 => Column::Floats(series.f32()?.iter().map(|v| v.map(f64::from)).collect()),
         DataType::Int32 | DataType::Int64 | DataType::UInt32 | DataType::UInt64 => {
-            Column::Integers(series.strict_cast(&DataType::Int64)?.i64()?.iter().collect())
+            Column::Integers(cells(series.strict_cast(&DataType::Int64)?.i64()?))
         }
         DataType::Boolean => Column::Booleans(series.bool()?.iter().collect()),
         DataType::String => Column::Texts(series.str()?.iter().map(|v| v.map(str::to_owned)).collect()),
@@ -270,6 +290,14 @@ fn values(series: &Series) -> PolarsResult<Column> {
         DataType::Datetime(unit, zone) => instants(series, *unit, zone.is_some())?,
         other => Column::Other(format!("the type {other}")),
     })
+}
+
+/// The values of a column. One without holes, as most are, is copied without a look at each cell's bit.
+fn cells<T: PolarsNumericType>(column: &ChunkedArray<T>) -> Vec<Option<T::Native>> {
+    match column.cont_slice() {
+        Ok(values) if column.null_count() == 0 => values.iter().copied().map(Some).collect(),
+        _ => column.iter().collect(),
+    }
 }
 
 fn instants(series: &Series, unit: PolarsUnit, zoned: bool) -> PolarsResult<Column> {

@@ -15,7 +15,8 @@ use super::columnar::{
 };
 use super::error::InputError;
 
-/// Most rows that are decoded at once of a row group.
+/// Most rows that are decoded at once of a row group. It begins with as many as a piece has, and goes on with twice as many each time:
+/// whoever looks at the first rows alone waits for no more.
 const WINDOW: usize = 1 << 17;
 
 /// The rows of a columnar file, a piece at a time.
@@ -45,7 +46,7 @@ impl ColumnarChunks {
     /// A footer that is none, and a Parquet file without rows.
     pub(super) fn new(path: &Path, file: File, container: Container, rows: usize) -> Result<Self, InputError> {
         let (source, columns) = caught(path, container, || match container {
-            Container::Parquet => RowGroups::new(file).map(|(groups, columns)| (Source::Parquet(groups), columns)),
+            Container::Parquet => RowGroups::new(file, rows).map(|(groups, columns)| (Source::Parquet(groups), columns)),
             Container::Arrow => Batches::new(file).map(|(batches, columns)| (Source::Arrow(batches), columns)),
         })?;
         let (path, decoded) = (path.to_path_buf(), DataFrame::empty());
@@ -88,19 +89,22 @@ struct RowGroups {
     /// The row group that is read, and how many rows of it were read.
     group: usize,
     within: usize,
-    /// Rows of all groups before.
-    before: usize,
+    /// The footer of a file that has this row group and no other.
+    alone: Arc<FileMetadata>,
+    /// Rows to decode next.
+    window: usize,
 }
 
 impl RowGroups {
-    fn new(mut file: File) -> PolarsResult<(Self, Columns)> {
+    fn new(mut file: File, first: usize) -> PolarsResult<(Self, Columns)> {
         let size = file.metadata()?.len();
         check_footer(&mut file, size)?;
         let mut reader = ParquetReader::new(file.try_clone()?);
         let columns = Columns::of(&*reader.schema()?);
         let footer = Arc::clone(reader.get_metadata()?);
         check_rows(&footer)?;
-        Ok((Self { file, size, footer, group: 0, within: 0, before: 0 }, columns))
+        let (alone, window) = (Arc::clone(&footer), first.clamp(1, WINDOW));
+        Ok((Self { file, size, footer, group: 0, within: 0, alone, window }, columns))
     }
 
     /// The next rows of the row group, or of the one after it.
@@ -110,25 +114,41 @@ impl RowGroups {
             if self.within < group.num_rows() {
                 break group.num_rows();
             }
-            self.before += group.num_rows();
             (self.group, self.within) = (self.group + 1, 0);
         };
         if self.within == 0 {
-            check_group(&self.footer, self.group, &mut self.file, self.size)?;
+            check_group(&self.footer, self.group, columns, &mut self.file, self.size)?;
+            self.alone = alone(&self.footer, self.group);
         }
-        let count = WINDOW.min(rows - self.within);
+        let count = self.window.min(rows - self.within);
+        self.window = self.window.saturating_mul(2).min(WINDOW);
         let mut reader = ParquetReader::new(self.file.try_clone()?);
-        reader.set_metadata(Arc::clone(&self.footer));
-        // Row groups without rows in the slice are left alone by this strategy only.
+        reader.set_metadata(Arc::clone(&self.alone));
         let frame = reader
-            .read_parallel(ParallelStrategy::RowGroups)
+            .read_parallel(ParallelStrategy::Columns)
             .with_columns(Some(columns.wanted.clone()))
-            .with_slice(Some((self.before + self.within, count)))
+            .with_slice(Some((self.within, count)))
             .finish()?;
         polars_ensure!(frame.height() == count, ComputeError: "its row counts contradict each other");
         self.within += count;
         Ok(Some(frame))
     }
+}
+
+/// `footer` without all row groups but one: whoever reads by it looks at no other.
+fn alone(footer: &Arc<FileMetadata>, group: usize) -> Arc<FileMetadata> {
+    let Some(own) = footer.row_groups.get(group).filter(|_| footer.row_groups.len() > 1) else { return Arc::clone(footer) };
+    Arc::new(FileMetadata {
+        version: footer.version,
+        num_rows: own.num_rows(),
+        max_row_group_height: own.num_rows(),
+        created_by: footer.created_by.clone(),
+        row_groups: vec![own.clone()],
+        key_value_metadata: footer.key_value_metadata.clone(),
+        schema_descr: footer.schema_descr.clone(),
+        column_orders: footer.column_orders.clone(),
+        footer_buf: footer.footer_buf.clone(),
+    })
 }
 
 /// The record batches of an Arrow file.

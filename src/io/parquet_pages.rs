@@ -136,14 +136,21 @@ struct PageHeader {
 /// Most values of a page: as many as the largest row group that writers make of a column that is all one value.
 const MOST_VALUES: i64 = 1 << 26;
 
-/// Whether the pages of a column chunk fit into its bytes and together have its `values`: the decoder makes room for these
-/// before it sees that there are fewer.
-pub(super) fn pages_agree(chunk: &[u8], values: i64) -> bool {
-    let mut thrift = Thrift::new(chunk);
-    let mut seen = 0;
-    while seen < values && thrift.left() > 0 {
-        let Some(header) = page_header(&mut thrift) else { return false };
-        let left = thrift.left() as i64;
+/// Bytes of a page that are looked at first: few headers have more, and what follows a header is gone over.
+const HEADER: u64 = 1 << 12;
+
+/// Whether the pages of a column chunk of `length` bytes fit into it and together have its `values`: the decoder makes room for these
+/// before it sees that there are fewer. `read` gives the bytes from a place in the chunk on, so many at most.
+pub(super) fn pages_agree<E>(
+    length: u64,
+    values: i64,
+    mut read: impl FnMut(u64, u64) -> Result<Vec<u8>, E>,
+) -> Result<bool, E> {
+    let (mut at, mut seen) = (0, 0);
+    while seen < values && at < length {
+        let Some((header, size)) = header_at(at, length, &mut read)? else { return Ok(false) };
+        at += size;
+        let left = length.saturating_sub(at) as i64;
         // No value of a dictionary is shorter than a byte.
         let most = if header.dictionary { header.uncompressed } else { (values - seen).min(MOST_VALUES) };
         // Compressed or not, a page of levels and values is no longer than that.
@@ -153,14 +160,33 @@ pub(super) fn pages_agree(chunk: &[u8], values: i64) -> bool {
             || header.uncompressed < 0
             || !(0..=most).contains(&header.values)
         {
-            return false;
+            return Ok(false);
         }
         seen += if header.dictionary { 0 } else { header.values };
-        if thrift.skip(header.compressed as u64).is_none() {
-            return false;
-        }
+        at += header.compressed as u64;
     }
-    seen == values
+    Ok(seen == values)
+}
+
+/// The page header at a place in a chunk, and its length in bytes; none where there is none.
+fn header_at<E>(
+    at: u64,
+    length: u64,
+    read: &mut impl FnMut(u64, u64) -> Result<Vec<u8>, E>,
+) -> Result<Option<(PageHeader, u64)>, E> {
+    let mut most = HEADER.min(length - at);
+    loop {
+        let bytes = read(at, most)?;
+        let mut thrift = Thrift::new(&bytes);
+        if let Some(header) = page_header(&mut thrift) {
+            return Ok(Some((header, (bytes.len() - thrift.left()) as u64)));
+        }
+        if most == length - at || (bytes.len() as u64) < most {
+            return Ok(None);
+        }
+        // It is longer, or none.
+        most = most.saturating_mul(16).min(length - at);
+    }
 }
 
 /// Whether a footer is built as the format says, and its lists are no longer than it is: the decoder makes room for them
@@ -204,6 +230,27 @@ mod tests {
         assert!(!footer_agrees(&[0x29, 0x25, 2, 4, 0]), "numbers where the format has structures");
         assert!(footer_agrees(&[0x05, 0x90, 0x03, 2, 0]), "a field that the format does not know, 200");
         assert!(!footer_agrees(&[0x05, 0x88, 0x80, 0x08, 2, 0]), "field 65540, which is 4 in 16 bits");
+    }
+
+    fn pages_agree(chunk: &[u8], values: i64) -> bool {
+        let read = |at: u64, most: u64| Ok::<_, ()>(chunk[at as usize..(at + most) as usize].to_vec());
+        super::pages_agree(chunk.len() as u64, values, read).unwrap()
+    }
+
+    /// Statistics of a page may hold texts of any length.
+    #[test]
+    fn a_header_of_any_length_is_read() {
+        for length in [10_usize, 5_000, 200_000] {
+            let (low, mid, high) = (length as u8 | 0x80, (length >> 7) as u8 | 0x80, (length >> 14) as u8);
+            let text = vec![b'x'; length];
+            let mut page =
+                vec![0x15, 0, 0x15, 8, 0x15, 8, 0x2c, 0x15, 6, 0x15, 0, 0x15, 6, 0x15, 6, 0x1c, 0x18, low, mid, high];
+            page.extend(&text);
+            page.extend([0, 0, 0, 1, 2, 3, 4]);
+            assert!(pages_agree(&[page.clone(), page.clone()].concat(), 6), "{length}");
+            assert!(!pages_agree(&page[..page.len() - 1], 3), "{length}");
+            assert!(!pages_agree(&page[..length / 2], 3), "{length}");
+        }
     }
 
     #[test]

@@ -40,6 +40,12 @@ impl Ending {
     }
 }
 
+/// Whether the ending of a name says a columnar format, of which any rows and columns can be read without the others.
+#[must_use]
+pub fn is_columnar(path: &Path) -> bool {
+    matches!(Ending::of(path), Ok(Ending::Columnar(_)))
+}
+
 /// Opens a file that exists and is no folder.
 pub(super) fn open(path: &Path) -> Result<File, InputError> {
     if path.is_dir() {

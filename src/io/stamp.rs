@@ -1,5 +1,7 @@
 //! Which end of a bar its time names, and the span of a bar that follows from it.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use crate::sim2real::Timestamp;
@@ -47,18 +49,55 @@ impl Stamp {
     }
 }
 
+/// How often each distance between neighbouring times occurs, as the times are told one by one.
+#[derive(Debug, Clone, Default)]
+pub struct Spacings {
+    before: Option<Timestamp>,
+    /// The distance that came last, and how often in a row: nearly always the same.
+    row: (i64, usize),
+    counts: BTreeMap<i64, usize>,
+}
+
+impl Spacings {
+    /// Another time, after the ones before it.
+    #[inline]
+    pub fn add(&mut self, time: Timestamp) {
+        if let Some(before) = self.before.replace(time) {
+            let spacing = time - before;
+            if spacing != self.row.0 {
+                self.count();
+                self.row = (spacing, 0);
+            }
+            self.row.1 += 1;
+        }
+    }
+
+    fn count(&mut self) {
+        if self.row.1 > 0 {
+            *self.counts.entry(self.row.0).or_default() += self.row.1;
+        }
+    }
+
+    /// The distance that occurs most often [ns], the shortest of them where several do; none of fewer than two times.
+    #[must_use]
+    pub fn most_common(mut self) -> Option<i64> {
+        self.count();
+        let mut best: Option<(usize, i64)> = None;
+        for (spacing, count) in self.counts {
+            if best.is_none_or(|(most, _)| count > most) {
+                best = Some((count, spacing));
+            }
+        }
+        best.map(|(_, spacing)| spacing)
+    }
+}
+
 /// The distance between neighbours that occurs most often [ns], the shortest of them where several do.
 #[must_use]
 pub fn common_spacing(times: &[Timestamp]) -> Option<i64> {
-    let mut spacings: Vec<i64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    spacings.sort_unstable();
-    let mut best: Option<(usize, i64)> = None;
-    for run in spacings.chunk_by(|a, b| a == b) {
-        if best.is_none_or(|(count, _)| run.len() > count) {
-            best = Some((run.len(), run[0]));
-        }
-    }
-    best.map(|(_, spacing)| spacing)
+    let mut spacings = Spacings::default();
+    times.iter().for_each(|time| spacings.add(*time));
+    spacings.most_common()
 }
 
 #[cfg(test)]

@@ -26,8 +26,17 @@ pub struct Table {
     body: Arc<Body>,
     /// Data rows of the file before these, where its rows are counted and not its lines.
     before: usize,
-    /// The rows of the body that are of the table; none for all.
-    only: Option<Vec<u32>>,
+    rows: Rows,
+}
+
+/// Which rows of what was read are of a table.
+#[derive(Clone)]
+pub(super) enum Rows {
+    All,
+    /// Those that follow one another, from one to before another.
+    Span(usize, usize),
+    /// Those of these numbers, which data frames count in 32 bits.
+    Chosen(Vec<u32>),
 }
 
 enum Body {
@@ -69,11 +78,20 @@ impl Table {
     /// # Errors
     /// As [`read_with`](Self::read_with), but for that.
     pub fn read_even_empty(path: impl AsRef<Path>, renames: &Renames) -> Result<Self, InputError> {
-        let path = path.as_ref();
+        Self::read_columns(path.as_ref(), renames, None)
+    }
+
+    /// As [`read_even_empty`](Self::read_even_empty), of a columnar file no more than the columns `only`, where any are given: they
+    /// may be asked for, and no others.
+    pub(crate) fn read_columns(path: &Path, renames: &Renames, only: Option<&[&str]>) -> Result<Self, InputError> {
+        let own = |name: &&str| renames.get(*name).cloned().unwrap_or_else(|| (*name).to_owned());
+        let only: Option<Vec<String>> = only.map(|only| only.iter().map(own).collect());
         let body = match Ending::of(path)? {
             Ending::Csv => Body::Csv(CsvText::first_block(path, bytes(path, open(path)?)?)?),
             Ending::CsvGz => Body::Csv(CsvText::first_block(path, unzip(path, open(path)?)?)?),
-            Ending::Columnar(container) => Body::Columnar(ColumnarFile::read(path, open(path)?, container)?),
+            Ending::Columnar(container) => {
+                Body::Columnar(ColumnarFile::read(path, open(path)?, container, only.as_deref())?)
+            }
         };
         let table = Self::of(path, renames, body, 0);
         table.check_columns()?;
@@ -91,20 +109,44 @@ impl Table {
     }
 
     fn of(path: &Path, renames: &Renames, body: Body, before: usize) -> Self {
-        Self { path: path.to_path_buf(), renames: renames.clone(), body: Arc::new(body), before, only: None }
+        Self { path: path.to_path_buf(), renames: renames.clone(), body: Arc::new(body), before, rows: Rows::All }
     }
 
     /// The number in the body of a row of the table.
     pub(super) fn row_in_file(&self, row: usize) -> u32 {
-        // Data frames count rows in 32 bits.
-        let row = row.try_into().unwrap_or(u32::MAX);
-        self.only.as_ref().map_or(row, |only| only.get(row as usize).copied().unwrap_or(row))
+        self.own_row(row).try_into().unwrap_or(u32::MAX)
+    }
+
+    fn own_row(&self, row: usize) -> usize {
+        match &self.rows {
+            Rows::All => row,
+            Rows::Span(first, _) => first + row,
+            Rows::Chosen(rows) => rows.get(row).map_or(row, |own| *own as usize),
+        }
     }
 
     /// Those of the file's rows, by number from 0, without a copy of them: errors give the places they have in the file.
     pub(super) fn with_rows(&self, rows: Vec<u32>) -> Self {
+        self.with(Rows::Chosen(rows))
+    }
+
+    fn with(&self, rows: Rows) -> Self {
         let (path, renames, body) = (self.path.clone(), self.renames.clone(), Arc::clone(&self.body));
-        Self { path, renames, body, before: self.before, only: Some(rows) }
+        Self { path, renames, body, before: self.before, rows }
+    }
+
+    /// The table in pieces of at most so many rows, in their order and without a copy of them: what is made of a piece is small and
+    /// stays near the processor, which what is made of a long table does not.
+    pub(crate) fn pieces(&self, most: usize) -> impl Iterator<Item = Self> {
+        let (all, most) = (self.rows(), most.max(1));
+        (0..all).step_by(most).map(move |first| {
+            let end = all.min(first + most);
+            self.with(match &self.rows {
+                Rows::All => Rows::Span(first, end),
+                Rows::Span(before, _) => Rows::Span(before + first, before + end),
+                Rows::Chosen(rows) => Rows::Chosen(rows[first..end].to_vec()),
+            })
+        })
     }
 
     /// Holds the columns to have names of their own, and the renames to be of columns that are there.
@@ -133,10 +175,11 @@ impl Table {
     /// Number of data rows; at least 1, but of [`read_even_empty`](Self::read_even_empty).
     #[must_use]
     pub fn rows(&self) -> usize {
-        match (&self.only, &*self.body) {
-            (Some(only), _) => only.len(),
-            (None, Body::Csv(csv)) => csv.rows(),
-            (None, Body::Columnar(file)) => file.rows(),
+        match (&self.rows, &*self.body) {
+            (Rows::Span(first, end), _) => end - first,
+            (Rows::Chosen(rows), _) => rows.len(),
+            (Rows::All, Body::Csv(csv)) => csv.rows(),
+            (Rows::All, Body::Columnar(file)) => file.rows(),
         }
     }
 
@@ -308,7 +351,7 @@ impl Table {
     /// Where data row `row`, from 0, is in the file.
     #[must_use]
     pub fn place(&self, row: usize) -> Place {
-        let row = if self.only.is_some() { self.row_in_file(row) as usize } else { row };
+        let row = self.own_row(row);
         match &*self.body {
             Body::Csv(csv) => Place::Row(csv.line(row)),
             Body::Columnar(_) => Place::Row(self.before + row + 1),
@@ -329,12 +372,14 @@ impl Table {
     fn column(&self, name: &str) -> Result<Cells<'_>, InputError> {
         let own = self.own_name(name);
         let index = self.own_names().iter().position(|n| n == own).ok_or_else(|| self.no_column(own))?;
-        Ok(match (&*self.body, &self.only) {
-            (Body::Csv(csv), Some(only)) => {
-                Cells::Text(Box::new(only.iter().map(move |row| csv.cell(*row as usize, index))))
+        Ok(match (&*self.body, &self.rows) {
+            (Body::Csv(csv), Rows::Chosen(rows)) => {
+                Cells::Text(Box::new(rows.iter().map(move |row| csv.cell(*row as usize, index))))
             }
-            (Body::Csv(csv), None) => Cells::Text(Box::new((0..csv.rows()).map(move |row| csv.cell(row, index)))),
-            (Body::Columnar(file), only) => match file.column(own, only.as_deref()) {
+            (Body::Csv(csv), _) => {
+                Cells::Text(Box::new((0..self.rows()).map(move |row| csv.cell(self.own_row(row), index))))
+            }
+            (Body::Columnar(file), rows) => match file.column(own, rows) {
                 // Some writers keep numbers as texts: they are read as a CSV's cells are.
                 Column::Texts(values) => {
                     Cells::Text(Box::new(values.into_iter().map(|v| v.map_or(Cow::Borrowed(""), Cow::Owned))))

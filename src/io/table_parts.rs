@@ -59,6 +59,14 @@ mod tests {
             assert_eq!((a.rows(), b.rows(), a.floats("price").unwrap()), (1, 2, vec![None]));
             let times = b.times("ts", &TimeFormat::default()).unwrap();
             assert_eq!(times.iter().map(|time| time.0).collect::<Vec<_>>(), [1, 3]);
+            for of in [whole.clone(), whole.chosen(&[2, 0, 1]), whole.pieces(3).next().unwrap()] {
+                let pieces: Vec<Table> = of.pieces(2).collect();
+                assert_eq!(pieces.iter().map(Table::rows).collect::<Vec<_>>(), [2, 1]);
+                let symbols = |table: &Table| table.texts_complete("symbol").unwrap();
+                assert_eq!(pieces.iter().flat_map(symbols).collect::<Vec<_>>(), symbols(&of));
+                assert_eq!((pieces[1].place(0), pieces[0].place(1)), (of.place(2), of.place(1)));
+                assert_eq!(pieces[1].pieces(1).next().unwrap().place(0), of.place(2));
+            }
             let third = b.filtered(|row| row == 1);
             let error = third.floats("price").unwrap_err();
             assert_eq!(error.place, whole.place(2), "{error}");

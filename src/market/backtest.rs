@@ -9,6 +9,7 @@ use super::halt::check_halts;
 use super::line::Line;
 use super::redraws::Redraws;
 use super::sources::RowKind;
+use super::spare::Spare;
 use super::{
     Account, AccountRecord, Calendar, Cash, DataNotes, Execution, Feed, Halt, HaltSeen, History, Increments, Instrument,
     Latencies, LatencyError, Ledger, LedgerError, Matching, MoneyError, QueueModel, Reference, Session, Sources, Strategy,
@@ -25,6 +26,8 @@ pub struct Backtest {
     pub(super) settings: Settings,
     /// What is drawn anew within a run.
     pub(super) redraws: Option<Arc<Redraws>>,
+    /// Memory that runs to come go on in.
+    pub(super) spare: Spare,
 }
 
 /// What else a backtest depends on.
@@ -336,7 +339,7 @@ impl Backtest {
             account.check(&instruments)?;
             account.check_actions(&instruments, &histories)?;
         }
-        Ok(Self { instruments, increments, histories, venue, settings, redraws: None })
+        Ok(Self { instruments, increments, histories, venue, settings, redraws: None, spare: Spare::default() })
     }
 
     /// The instruments.
@@ -368,7 +371,13 @@ impl Backtest {
     /// # Errors
     /// As [`Backtest::new`].
     pub fn on(&self, histories: Vec<History>) -> Result<Self, BacktestError> {
-        Self::new(self.instruments.clone(), histories, self.venue.clone(), self.settings.clone())
+        let backtest = Self::new(self.instruments.clone(), histories, self.venue.clone(), self.settings.clone())?;
+        Ok(backtest.beside(self))
+    }
+
+    /// The same backtest, its runs in the [memory](Self::recycle) of those of `other`.
+    pub(super) fn beside(self, other: &Self) -> Self {
+        Self { spare: other.spare.clone(), ..self }
     }
 
     /// Starts it, before its first event.
@@ -417,7 +426,16 @@ impl Backtest {
     /// If an amount overflows, or a mechanism gives a price no market has.
     pub fn run(&self, strategy: &mut dyn Strategy) -> Result<Record, BacktestError> {
         let mut session = self.start();
+        if let Some(over) = self.spare.take() {
+            session.go_on_in(over);
+        }
         while session.advance(strategy, usize::MAX)? {}
         session.finish()
+    }
+
+    /// Gives back what a run left and nobody reads any more: the next one, of this backtest or of a copy of it, goes on in its
+    /// memory. What comes of it is the same to the last bit.
+    pub fn recycle(&self, over: Record) {
+        self.spare.give(over);
     }
 }

@@ -162,8 +162,9 @@ impl RunDraws {
         let venue = self.twin.assembly.clone().with_values(&self.lanes[index]);
         let ran = self.backtest.with_venue(venue).run(strategy).map_err(|error| error.to_string());
         let told = ran.and_then(|record| {
-            let metrics = Metrics::of(&record).map_err(|error| error.to_string())?;
-            Ok((figures(&metrics), at(&record.equity, &self.time)))
+            let (metrics, equity) = (Metrics::of(&record), at(&record.equity, &self.time));
+            self.backtest.recycle(record);
+            Ok((figures(&metrics.map_err(|error| error.to_string())?), equity))
         });
         match told {
             Ok((figures, equity)) => DrawnRun { outcome: DrawOutcome::Done(figures), equity },

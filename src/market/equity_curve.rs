@@ -34,9 +34,14 @@ impl EquityCurve {
         Self { every, points: Vec::with_capacity(room), now: None, sum: 0.0, count: 0 }
     }
 
-    /// Goes on in the memory of another that is over, where that has more.
-    pub fn reuse(&mut self, over: &mut Self) {
-        reuse(&mut self.points, &mut over.points);
+    /// Goes on in the memory of points that are over, where that has more.
+    pub fn reuse(&mut self, over: Vec<EquityPoint>) {
+        reuse(&mut self.points, over);
+    }
+
+    /// All points so far, which it has no longer.
+    pub fn take_points(&mut self) -> Vec<EquityPoint> {
+        std::mem::take(&mut self.points)
     }
 
     /// The equity of now.
@@ -90,13 +95,13 @@ impl EquityCurve {
     }
 }
 
-/// `rows` go on in the memory of those of `over`, where that has more: a run of any length leaves memory behind that the next one
+/// `rows` go on in the memory of those of `over`, where that has as much: a run of any length leaves memory behind that the next one
 /// would have to ask the system for.
-pub(super) fn reuse<T>(rows: &mut Vec<T>, over: &mut Vec<T>) {
-    if over.capacity() > rows.capacity() {
+pub(super) fn reuse<T>(rows: &mut Vec<T>, mut over: Vec<T>) {
+    if over.capacity() >= rows.capacity() {
         over.clear();
         over.append(rows);
-        std::mem::swap(rows, over);
+        *rows = over;
     }
 }
 

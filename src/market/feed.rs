@@ -1,5 +1,6 @@
 //! The histories of all instruments, merged by when things happened.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::sim2real::Timestamp;
@@ -42,6 +43,17 @@ pub struct Feed {
     losers: Vec<u32>,
     /// The track given out last has to read on before the next row.
     low: Option<u32>,
+}
+
+/// Bars of one instrument that come one after the other.
+pub(super) struct BarsAlone<'f> {
+    pub instrument: usize,
+    /// All at hand.
+    pub bars: &'f Arc<Vec<Bar>>,
+    /// Those of them that come before more must be read.
+    pub next: Range<usize>,
+    /// When other data come between.
+    pub end: Timestamp,
 }
 
 impl Feed {
@@ -140,22 +152,24 @@ impl Feed {
         self.lines[instrument].read_on(kind, next, keep)
     }
 
-    /// The bars of an instrument, where they are in memory and one of them comes next: all of them, the number of the next, and
-    /// when other data come between.
-    pub(super) fn bars_alone(&self) -> Option<(usize, &Arc<Vec<Bar>>, usize, Timestamp)> {
+    /// The bars of an instrument at hand, where one of them comes next.
+    pub(super) fn bars_alone(&self) -> Option<BarsAlone<'_>> {
         let winner = *self.losers.first()?;
         let Track { instrument, kind, next } = self.tracks[winner as usize];
         if kind != RowKind::Bars {
             return None;
         }
-        let bars = self.lines[instrument].all_bars()?;
+        let (bars, first, limit) = self.lines[instrument].bars_at_hand();
+        // The row before the limit is the one with which more is read.
+        let to = bars.len().min(limit.saturating_sub(1).saturating_sub(first));
         // The winner has beaten all others: who comes second is among the losers on its way.
         let (mut node, mut end) = ((self.tracks.len() + winner as usize) / 2, Timestamp::MAX);
         while node > 0 {
             end = end.min(self.times[self.losers[node] as usize]);
             node /= 2;
         }
-        Some((instrument, bars, next, end))
+        let from = next - first;
+        Some(BarsAlone { instrument, bars, next: from..to.max(from), end })
     }
 
     /// The first `count` of [these bars](Self::bars_alone) are over.

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use crate::io::{FeedFormat, Increase, InputError, Layout, OnBad, Table, TableChunks, check_increasing, common_spacing};
-use crate::sim2real::Timestamp;
+use crate::io::{FeedFormat, Increase, InputError, Layout, OnBad, Spacings, Stamp, Table, TableChunks, not_increasing};
 
-use super::stream::{BarRows, bars_of};
+use super::stream::{BarRows, PIECE, bars_of};
 use super::{Bar, DataNotes, FileStream, History, HistoryError, Quotes, Side};
 
 /// The columns of a file of bars.
@@ -105,6 +104,22 @@ fn sound(path: impl AsRef<Path>, history: Result<History, HistoryError>, notes: 
 
 /// The bars of a table, and what was found in it.
 pub(super) fn bars(table: &Table, format: &FeedFormat, interval: Option<i64>) -> Result<(Vec<Bar>, DataNotes), InputError> {
+    let (stamp, interval) = spans(table, format, interval)?;
+    bars_of(table, format, BarRows::new(format, stamp, interval))
+}
+
+/// How long a bar of a file is [ns]: as long as it is `declared`, or else as the most common distance between two of them. Nothing but
+/// their times is read of a columnar file.
+///
+/// # Errors
+/// As [`History::read_bars`], as far as times show it.
+pub(super) fn bar_interval(path: &Path, format: &FeedFormat, declared: Option<i64>) -> Result<i64, InputError> {
+    let table = Table::read_columns(path, &format.columns, Some(&[BarRows::time_column(format)]))?;
+    spans(&table, format, declared).map(|(_, interval)| interval)
+}
+
+/// Which end of a bar its time names, and how long a bar is [ns].
+fn spans(table: &Table, format: &FeedFormat, declared: Option<i64>) -> Result<(Stamp, i64), InputError> {
     let Some(stamp) = format.stamp else {
         let error = InputError::new(table.path(), "nothing says which end of a bar its time names");
         return Err(error.hint("add stamp = \"open\" or stamp = \"close\" to the section that names the file"));
@@ -113,8 +128,8 @@ pub(super) fn bars(table: &Table, format: &FeedFormat, interval: Option<i64>) ->
         let error = InputError::new(table.path(), format!("the layout `{}` has no bars", format.layout.word()));
         return Err(error.hint("bars are of the layout `trueup` or `lean`"));
     }
-    let common = common_spacing(&increasing_times(table, format)?);
-    if let (Some(declared), Some(common)) = (interval, common)
+    let common = spacings(table, format)?.most_common();
+    if let (Some(declared), Some(common)) = (declared, common)
         && common < declared
     {
         let message =
@@ -122,31 +137,36 @@ pub(super) fn bars(table: &Table, format: &FeedFormat, interval: Option<i64>) ->
         let error = InputError::new(table.path(), message).in_column(BarRows::time_column(format));
         return Err(error.hint("give the length of one bar"));
     }
-    let interval = interval.or(common).ok_or_else(|| {
+    let interval = declared.or(common).ok_or_else(|| {
         let error = InputError::new(table.path(), "one bar alone does not show how long a bar is");
         error.hint("declare it: interval = \"1m\" in [[data]]; the tape of a twin needs two bars at least")
     })?;
-    bars_of(table, format, BarRows::new(format, stamp, interval))
+    Ok((stamp, interval))
 }
 
-/// The times of bars, without those that do not increase: whether there may be such is for the reader of the bars to say.
-fn increasing_times(table: &Table, format: &FeedFormat) -> Result<Vec<Timestamp>, InputError> {
+/// How far bars are apart, those left out that are no later than one before them: whether there may be such is for the policy to say.
+fn spacings(table: &Table, format: &FeedFormat) -> Result<Spacings, InputError> {
     let column = BarRows::time_column(format);
-    let times = match format.rules.on_bad {
-        OnBad::Refuse => {
-            let times = table.times(column, &format.time)?;
-            check_increasing(table, column, &times, Increase::Strictly)?;
-            return Ok(times);
-        }
-        OnBad::Drop => table.times_with_holes(column, &format.time)?,
-    };
-    let mut increasing: Vec<Timestamp> = Vec::with_capacity(times.len());
-    for time in times.into_iter().flatten() {
-        if increasing.last().is_none_or(|last| *last < time) {
-            increasing.push(time);
+    let refuses = format.rules.on_bad == OnBad::Refuse;
+    let (mut spacings, mut newest) = (Spacings::default(), None);
+    for piece in table.pieces(PIECE) {
+        for (row, time) in piece.times_with_holes(column, &format.time)?.into_iter().enumerate() {
+            match (time, newest) {
+                (None, _) if refuses => return Err(piece.missing(column, row, "a time")),
+                (Some(time), Some((before, place))) if time <= before => {
+                    if refuses {
+                        return Err(not_increasing(&piece, column, row, &time, (&before, place), Increase::Strictly));
+                    }
+                }
+                (Some(time), _) => {
+                    spacings.add(time);
+                    newest = Some((time, piece.place(row)));
+                }
+                (None, _) => {}
+            }
         }
     }
-    Ok(increasing)
+    Ok(spacings)
 }
 
 /// The error at its place in the file, in the file's own unit.

@@ -159,7 +159,7 @@ impl Ledger {
     pub fn mark(&mut self, instrument: usize, price: Price) -> Result<(), MoneyError> {
         let Some(position) = self.positions.get_mut(instrument) else { return Ok(()) };
         if position.quantity.0 != 0 {
-            let change = position.amount(price, position.quantity)?.minus(position.value())?;
+            let change = position.change_to(price)?;
             let balance = &mut self.balances[position.currency];
             balance.holdings = balance.holdings.plus(change)?;
         }

@@ -66,12 +66,13 @@ impl Line {
         }
     }
 
-    /// All bars, where they are in memory.
-    pub fn all_bars(&self) -> Option<&Arc<Vec<Bar>>> {
-        match &self.data {
-            Data::Whole(history) => Some(history.shared_bars()),
-            Data::Part(_) => None,
-        }
+    /// The bars at hand, the row of the first of them, and the row from which on more must be read.
+    pub fn bars_at_hand(&self) -> (&Arc<Vec<Bar>>, usize, usize) {
+        let (bars, k) = match &self.data {
+            Data::Whole(history) => (history.shared_bars(), RowKind::Bars as usize),
+            Data::Part(part) => (part.at_hand.shared_bars(), RowKind::Bars as usize),
+        };
+        (bars, self.first[k], self.limit[k])
     }
 
     /// The rows at hand.

@@ -108,6 +108,7 @@ mod run_stream;
 mod session;
 mod shown_age;
 mod sources;
+mod spare;
 mod strategy;
 mod stream;
 #[cfg(feature = "io")]
@@ -181,9 +182,9 @@ pub use run::{PreparedRun, explained, prepare_run};
 #[cfg(feature = "io")]
 pub use run_as_twin::settle_trued_run;
 #[cfg(feature = "io")]
-pub use run_log::{InputFile, OutputError, Provenance, RunOutputs, RunSummary};
+pub use run_log::{InputFile, OutputError, Provenance, RunBrief, RunOutputs, RunSummary};
 #[cfg(feature = "io")]
-pub use run_stream::prepare_streaming_run;
+pub use run_stream::{prepare_streaming_run, streams_as_well};
 pub use session::Session;
 pub use sources::Sources;
 pub use strategy::{Event, EventKind, News, Notice, Orders, Strategy, View};

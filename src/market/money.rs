@@ -61,15 +61,26 @@ pub enum MoneyError {
 }
 
 /// `value` in whole 1e-9, to the nearest, half away from 0.
+#[inline]
 fn nanos(what: &'static str, value: f64) -> Result<i64, MoneyError> {
     const LIMIT: f64 = 9.2e9;
-    if !value.is_finite() {
-        return Err(MoneyError::NotFinite { what, value });
+    if value.abs() <= LIMIT {
+        return Ok(rounded(value * NANO));
     }
-    if value.abs() > LIMIT {
-        return Err(MoneyError::TooLarge { what, value, limit: LIMIT });
-    }
-    Ok((value * NANO).round() as i64)
+    Err(match value.is_finite() {
+        true => MoneyError::TooLarge { what, value, limit: LIMIT },
+        false => MoneyError::NotFinite { what, value },
+    })
+}
+
+/// The integer nearest to `value`, which 64 bits hold, half away from 0: as `round` has it, which is a call of a library on most
+/// processors, and every price that is read is rounded.
+#[inline]
+fn rounded(value: f64) -> i64 {
+    let whole = value as i64;
+    // Beyond 2^53 there is nothing behind the point; below, the difference is exact.
+    let rest = value - whole as f64;
+    whole + i64::from(rest >= 0.5) - i64::from(rest <= -0.5)
 }
 
 /// A price [1e-9 of the currency].
@@ -348,6 +359,15 @@ mod tests {
         assert_eq!((price * quantity).to_string(), "370.8018");
         assert_eq!((Price(1) * Quantity(1)).to_string(), "0.000000000000000001");
         assert_eq!((Price(i64::MAX) * Quantity(i64::MIN)).0, i128::from(i64::MAX) * i128::from(i64::MIN));
+    }
+
+    #[test]
+    fn a_number_is_rounded_as_round_has_it() {
+        let half = [0.0, 0.5, 1.5, 2.5, 0.499_999_999_999_999_94, 4_503_599_627_370_495.5, 9_007_199_254_740_993.0, 9.2e18];
+        let near = |value: f64| [value.next_down(), value, value.next_up()];
+        for value in half.into_iter().flat_map(near).flat_map(|value| [value, -value]) {
+            assert_eq!(rounded(value), value.round() as i64, "{value}");
+        }
     }
 
     #[test]

@@ -6,7 +6,22 @@ use super::{Bar, DepthAction, DepthChange, HistoryError, Level, OrderAction, Ord
 
 /// Holds a bar to be one: it ends after it begins, its prices are above 0 with low <= open, close <= high, and its volume
 /// is 0 or more.
+#[inline(always)]
 pub(super) fn check_bar(row: usize, bar: &Bar) -> Result<(), HistoryError> {
+    if is_bar(bar) { Ok(()) } else { bar_fault(row, bar) }
+}
+
+/// Whether [`check_bar`] has nothing against a bar.
+#[inline(always)]
+pub(super) fn is_bar(bar: &Bar) -> bool {
+    let within = |price: Price| bar.low <= price && price <= bar.high;
+    let priced = bar.low.0 > 0 && within(bar.open) && within(bar.close);
+    priced && bar.open_at < bar.known_at && (0.0..f64::INFINITY).contains(&bar.volume)
+}
+
+/// What [`check_bar`] has against a bar.
+#[cold]
+fn bar_fault(row: usize, bar: &Bar) -> Result<(), HistoryError> {
     if bar.known_at <= bar.open_at {
         return Err(HistoryError::Span { row, open_at: bar.open_at, known_at: bar.known_at });
     }

@@ -14,7 +14,7 @@ use super::run_beside::Beside;
 use super::run_log::InputFile;
 use super::{
     Backtest, BacktestError, Calendar, Cash, Execution, History, Instrument, Latencies, Matching, MoneyError, Provenance,
-    Record, Reference, RunOutputs, Settings, StreamError, run_needs,
+    Record, Reference, RunBrief, RunOutputs, Settings, StreamError, run_needs,
 };
 
 /// A backtest as a run declares it, with its data read.
@@ -42,17 +42,21 @@ pub fn prepare_run(run: &RunFile) -> Result<PreparedRun, InputError> {
     // What needs no data is said before they are read.
     venue(run)?;
     let beside = Beside::read(run)?;
-    let (mut rows, mut read) = (Vec::new(), Vec::new());
-    for entry in &run.data {
-        let history = if entry.kind == FeedKind::Actions { None } else { Some(history(entry)?) };
-        rows.push(history.as_ref().map(History::rows));
-        read.push(history);
-    }
+    // Nothing of the one depends on the other.
+    let (read, inputs) = rayon::join(|| read_data(run), || beside.inputs(run));
+    let mut read = read?;
+    let rows: Vec<Option<usize>> = read.iter().map(|history| history.as_ref().map(History::rows)).collect();
     let joined = run.instruments.iter().enumerate().map(|(index, entry)| joined(run, index, &entry.symbol, &mut read));
     let histories = joined.collect::<Result<Vec<History>, InputError>>()?;
     let backtest = set_up(run, histories, &beside)?;
-    let provenance = provenance(run, &backtest, beside.inputs(run, &rows)?)?;
+    let provenance = provenance(run, &backtest, beside.with_rows(inputs?, &rows))?;
     Ok(PreparedRun { provenance, backtest, streamed: None, beside })
+}
+
+/// The market data of `run`, one for each `[[data]]`; none for what is no market data.
+fn read_data(run: &RunFile) -> Result<Vec<Option<History>>, InputError> {
+    let read = |entry: &DataEntry| if entry.kind == FeedKind::Actions { Ok(None) } else { history(entry).map(Some) };
+    run.data.iter().map(read).collect()
 }
 
 /// What `backtest`, that of `run`, is made of: its document and `files`.
@@ -110,7 +114,8 @@ impl PreparedRun {
     /// # Errors
     /// As [`prepare_run`], but for what it says of files.
     pub fn variant(&self, run: &RunFile) -> Result<Backtest, InputError> {
-        set_up(run, self.backtest.histories().to_vec(), &self.beside)
+        let backtest = set_up(run, self.backtest.histories().to_vec(), &self.beside)?;
+        Ok(backtest.beside(&self.backtest))
     }
 
     /// All that `record`, the record of this backtest, is shown as.
@@ -118,6 +123,18 @@ impl PreparedRun {
     /// # Errors
     /// If an amount of cash is beyond what can be held.
     pub fn outputs(&self, record: &Record) -> Result<RunOutputs, MoneyError> {
+        RunOutputs::new(self.provenance_of(record), &self.backtest, record)
+    }
+
+    /// `record`, the record of this backtest, in brief: without tables and plots.
+    ///
+    /// # Errors
+    /// If an amount of cash is beyond what can be held.
+    pub fn brief(&self, record: &Record) -> Result<RunBrief, MoneyError> {
+        RunBrief::new(self.provenance_of(record), &self.backtest, record)
+    }
+
+    fn provenance_of(&self, record: &Record) -> Provenance {
         let mut provenance = self.provenance.clone();
         if let Some(run) = &self.streamed {
             // Only now is known how many rows the files have.
@@ -129,11 +146,10 @@ impl PreparedRun {
                 file.rows = notes.map(|notes| notes.rows() as usize);
             }
         }
-        RunOutputs::new(provenance, &self.backtest, record)
+        provenance
     }
 }
 
-/// The name of each instrument's calendar, by its symbol.
 fn calendar_names(run: &RunFile, backtest: &Backtest) -> BTreeMap<String, String> {
     let named = |calendar: &Calendar| calendar.name().to_owned();
     let all = run.instruments.iter().zip(&backtest.settings().calendars);

@@ -35,12 +35,20 @@ impl Beside {
         Ok(Self { calendars, account, halts, rows })
     }
 
-    /// All files `run` depends on but its document: calendars, data, rates, halts. `rows` are those of market data, where they were read.
+    /// All files `run` depends on but its document: calendars, data, rates, halts.
     ///
     /// # Errors
     /// A file that cannot be read any more.
-    pub fn inputs(&self, run: &RunFile, rows: &[Option<usize>]) -> Result<Vec<InputFile>, InputError> {
-        self.inputs_with(run, rows, |_| true)
+    pub fn inputs(&self, run: &RunFile) -> Result<Vec<InputFile>, InputError> {
+        self.inputs_with(run, |_| true)
+    }
+
+    /// The same [`inputs`](Self::inputs) with the rows of market data, one for each `[[data]]`.
+    pub fn with_rows(&self, mut inputs: Vec<InputFile>, rows: &[Option<usize>]) -> Vec<InputFile> {
+        for (file, rows) in inputs.iter_mut().skip(self.calendars.files.len()).zip(rows) {
+            file.rows = file.rows.or(*rows);
+        }
+        inputs
     }
 
     /// The same without market data, whose rows come from elsewhere.
@@ -48,19 +56,13 @@ impl Beside {
     /// # Errors
     /// A file that cannot be read any more.
     pub fn inputs_without_market(&self, run: &RunFile) -> Result<Vec<InputFile>, InputError> {
-        self.inputs_with(run, &[], |kind| kind == FeedKind::Actions)
+        self.inputs_with(run, |kind| kind == FeedKind::Actions)
     }
 
-    fn inputs_with(
-        &self,
-        run: &RunFile,
-        rows: &[Option<usize>],
-        with: impl Fn(FeedKind) -> bool,
-    ) -> Result<Vec<InputFile>, InputError> {
+    fn inputs_with(&self, run: &RunFile, with: impl Fn(FeedKind) -> bool) -> Result<Vec<InputFile>, InputError> {
         let mut inputs = self.calendars.files.clone();
         for (number, entry) in run.data.iter().enumerate().filter(|(_, entry)| with(entry.kind)) {
-            let of = |rows: &[Option<usize>]| rows.get(number).copied().flatten();
-            let rows = of(&self.rows).or(of(rows));
+            let rows = self.rows.get(number).copied().flatten();
             inputs.push(InputFile { path: entry.named.clone(), sha256: file_hash(&entry.path)?, rows });
         }
         for (number, rate) in run.rates.iter().enumerate() {

@@ -6,11 +6,12 @@ use chrono_tz::Tz;
 use serde::{Serialize, Serializer};
 
 use crate::io::{InputError, OutputFolder, OutputTable};
-use crate::report::{BacktestPage, ReportError};
+use crate::report::{BacktestPage, Metric, ReportError};
 
 use super::draws::{DrawsSummary, RunDraws};
 use super::metric::{Counts, CurrencySummary, InstrumentSummary, Metrics, RoundTrip};
-use super::run_page::run_page;
+use super::run_figures::key_figures;
+use super::run_page::{run_page, title};
 use super::{Backtest, DataSummary, HaltSummary, Instrument, MoneyError, Price, Record, Reference};
 
 /// A file a run depends on.
@@ -101,6 +102,36 @@ impl RunSummary {
             draws: None,
         })
     }
+
+    /// `run.json` as text.
+    ///
+    /// # Errors
+    /// If it is no JSON, which would be a bug.
+    pub fn json(&self) -> Result<String, OutputError> {
+        Ok(format!("{}\n", serde_json::to_string_pretty(self)?))
+    }
+}
+
+/// A run in a sentence and its key figures: what is shown where nothing is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunBrief {
+    /// `run.json`.
+    pub summary: RunSummary,
+    /// What was traded, when, and how it went.
+    pub title: String,
+    /// The figures that come first.
+    pub metrics: Vec<Metric>,
+}
+
+impl RunBrief {
+    /// `record`, the record of `backtest`, in brief.
+    ///
+    /// # Errors
+    /// If an amount of cash is beyond what can be held.
+    pub fn new(provenance: Provenance, backtest: &Backtest, record: &Record) -> Result<Self, MoneyError> {
+        let summary = RunSummary::new(provenance, record, backtest.instruments())?;
+        Ok(Self { title: title(&summary, backtest, record), metrics: key_figures(&summary), summary })
+    }
 }
 
 /// All that a run is shown as.
@@ -175,9 +206,9 @@ impl RunOutputs {
     /// `run.json` as text.
     ///
     /// # Errors
-    /// If the summary is no JSON, which would be a bug.
+    /// As [`RunSummary::json`].
     pub fn json(&self) -> Result<String, OutputError> {
-        Ok(format!("{}\n", serde_json::to_string_pretty(&self.summary)?))
+        self.summary.json()
     }
 
     /// Adds all files to `folder`.

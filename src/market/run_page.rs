@@ -40,7 +40,7 @@ pub(super) fn run_page(summary: &RunSummary, backtest: &Backtest, record: &Recor
 }
 
 /// What was traded, when, and how it went, in one sentence.
-fn title(summary: &RunSummary, backtest: &Backtest, record: &Record) -> String {
+pub(super) fn title(summary: &RunSummary, backtest: &Backtest, record: &Record) -> String {
     let symbols: Vec<&str> = backtest.instruments().iter().map(|i| i.symbol.as_str()).collect();
     // What is known at midnight belongs to the day that ends with it.
     let known = |time: Timestamp| DateTime::from_timestamp_nanos(time.0.saturating_sub(1));

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+#[cfg(feature = "io")]
+use super::stream::{Dated, ReadAhead};
 use super::stream::{Known, Stream};
 use super::{Bar, Book, DataNotes, DepthChange, EventKind, OrderEvent, Print};
 
@@ -63,6 +65,23 @@ impl Sources {
             RowKind::Orders => self.order_events.is_some(),
             RowKind::Quotes => self.quotes.is_some(),
         }
+    }
+
+    /// Each stream is read by a thread of its own from now on, ahead of whoever asks.
+    #[cfg(feature = "io")]
+    pub(super) fn read_ahead(&mut self) -> std::io::Result<()> {
+        fn ahead<T: Dated + Send + 'static>(stream: &mut Option<Box<dyn Stream<T>>>) -> std::io::Result<()> {
+            if let Some(own) = stream.take() {
+                *stream = Some(Box::new(ReadAhead::new(own)?));
+            }
+            Ok(())
+        }
+        let Self { bars, quotes, trades, depth, order_events } = self;
+        ahead(bars)?;
+        ahead(quotes)?;
+        ahead(trades)?;
+        ahead(depth)?;
+        ahead(order_events)
     }
 
     pub(super) fn notes(&self) -> Vec<DataNotes> {

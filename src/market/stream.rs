@@ -28,6 +28,8 @@ mod print_rows;
 #[cfg(feature = "io")]
 mod quote_rows;
 #[cfg(feature = "io")]
+mod read_ahead;
+#[cfg(feature = "io")]
 mod sequence;
 mod stored;
 #[cfg(feature = "io")]
@@ -44,8 +46,10 @@ pub(super) use between::Between;
 #[cfg(feature = "io")]
 pub use file_stream::FileStream;
 #[cfg(feature = "io")]
-pub(super) use file_stream::bars_of;
+pub(super) use file_stream::{PIECE, bars_of};
 pub use order_step::{Departure, NumberedPrint, OrderStep};
+#[cfg(feature = "io")]
+pub(super) use read_ahead::ReadAhead;
 pub use stored::Stored;
 #[cfg(feature = "io")]
 pub(super) use table_rows::{TableRows, check_rows};

@@ -23,8 +23,20 @@ pub struct Finals<'a> {
     pub ended: &'a [bool],
     /// What was observed last, shape (lanes, size).
     pub observations: &'a [f32],
-    /// Info at the end, shape (channels, lanes).
+    /// Info at the end, shape (channels, lanes); nothing where it is [not kept](Autoreset::keep).
     pub info: &'a [f64],
+}
+
+/// What of episodes that end is kept in [`AutoresetMode::SameStep`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Kept {
+    /// What was observed last, and info.
+    #[default]
+    All,
+    /// What was observed last.
+    Observations,
+    /// Nothing: there are no [`Finals`].
+    Nothing,
 }
 
 /// Steps lanes and resets those whose episodes are over. It trusts its caller, as [`VecEnv`] does: [`Checked`](super::Checked)
@@ -53,6 +65,21 @@ impl<E: VecEnv> Autoreset<E> {
         Self { env, mode, over: vec![false; lanes], ended: false, observations: vec![0.0; rows], info: vec![0.0; channels] }
     }
 
+    /// What of the episodes that end is kept as [`Finals`]: everything from the beginning. To ask for info, or to keep observations,
+    /// takes longer than many a step.
+    pub fn keep(&mut self, kept: Kept) {
+        let (lanes, about) = (self.over.len(), self.env.about());
+        let same = self.mode == AutoresetMode::SameStep;
+        let size = if same && kept != Kept::Nothing { about.observation.size() } else { 0 };
+        let channels = if same && kept == Kept::All { about.info.len() } else { 0 };
+        if same && [self.observations.len(), self.info.len()] != [lanes * size, lanes * channels] {
+            self.observations.resize(lanes * size, 0.0);
+            self.info.resize(lanes * channels, 0.0);
+            // Of ends before nothing is known from here on.
+            self.ended = false;
+        }
+    }
+
     /// The environment.
     #[must_use]
     pub fn env(&self) -> &E {
@@ -76,11 +103,11 @@ impl<E: VecEnv> Autoreset<E> {
         &self.over
     }
 
-    /// What was last of the episodes that ended in the step before, in [`AutoresetMode::SameStep`]; none where none did.
+    /// What was last of the episodes that ended in the step before, in [`AutoresetMode::SameStep`]; none where none did, or nothing is kept.
     #[must_use]
     pub fn finals(&self) -> Option<Finals<'_>> {
-        let same = self.mode == AutoresetMode::SameStep;
-        (same && self.ended).then_some(Finals { ended: &self.over, observations: &self.observations, info: &self.info })
+        let kept = !self.observations.is_empty();
+        (kept && self.ended).then_some(Finals { ended: &self.over, observations: &self.observations, info: &self.info })
     }
 
     /// As [`VecEnv::reset`].
@@ -123,7 +150,9 @@ impl<E: VecEnv> Autoreset<E> {
             AutoresetMode::SameStep => {
                 self.note_ends(out);
                 if self.ended {
-                    self.keep_finals(out);
+                    if !self.observations.is_empty() {
+                        self.keep_finals(out);
+                    }
                     self.env.reset(Which::Mask(&self.over), None, &Options::new(), out.observations)?;
                 }
             }
@@ -133,11 +162,12 @@ impl<E: VecEnv> Autoreset<E> {
     }
 
     fn note_ends(&mut self, out: &Out<'_>) {
-        self.ended = false;
+        let mut ended = false;
         for ((over, terminated), truncated) in self.over.iter_mut().zip(&*out.terminated).zip(&*out.truncated) {
             *over = *terminated | *truncated;
-            self.ended |= *over;
+            ended |= *over;
         }
+        self.ended = ended;
     }
 
     fn keep_finals(&mut self, out: &Out<'_>) {
@@ -221,6 +251,29 @@ mod tests {
         let mut taken = [0.0; 2];
         env.env().info(0, &mut taken);
         assert_eq!(taken, [1.0, 4.0]);
+    }
+
+    #[test]
+    fn info_of_the_end_is_kept_or_not_as_is_asked_and_changes_nothing_else() {
+        let (mut env, mut buffers) = driven(AutoresetMode::SameStep);
+        let (mut other, mut others) = (env.clone(), buffers.clone());
+        other.keep(Kept::Observations);
+        let (mut none, mut nones) = (env.clone(), buffers.clone());
+        none.keep(Kept::Nothing);
+        for number in 0..3 {
+            let all = step(&mut env, &mut buffers, number);
+            assert_eq!(all, step(&mut other, &mut others, number));
+            assert_eq!(all, step(&mut none, &mut nones, number));
+        }
+        assert_eq!((buffers, none.finals(), none.over()), (nones, None, env.over()));
+        let (with, without) = (env.finals().unwrap(), other.finals().unwrap());
+        assert_eq!((with.ended, with.observations[0]), (without.ended, without.observations[0]));
+        assert_eq!((with.info, without.info), (&[3.0, 3.0][..], &[][..]));
+        other.keep(Kept::All);
+        (3..6).for_each(|number| {
+            step(&mut other, &mut others, number);
+        });
+        assert_eq!(other.finals().unwrap().info[0], 3.0);
     }
 
     #[test]

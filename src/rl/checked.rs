@@ -1,6 +1,8 @@
 //! The front door of an environment: whatever it is given, it answers with a step or an error, and never with a panic.
 
-use super::{About, Actions, Autoreset, AutoresetMode, EnvError, Finals, Occasion, Options, Out, Space, VecEnv, Which};
+use super::{
+    About, Actions, Autoreset, AutoresetMode, EnvError, Finals, Kept, Occasion, Options, Out, Space, VecEnv, Which,
+};
 
 /// Drives an environment and checks all it is given: before anything moves, so that after an error all is as it was.
 ///
@@ -78,6 +80,11 @@ impl<E: VecEnv> Checked<E> {
     #[must_use]
     pub fn finals(&self) -> Option<Finals<'_>> {
         self.driver.finals()
+    }
+
+    /// What of episodes that end is kept as [`finals`](Self::finals): everything from the beginning.
+    pub fn keep(&mut self, kept: Kept) {
+        self.driver.keep(kept);
     }
 
     /// Begins an episode in the lanes of `which`: with seeds, one a lane, its first, else its next.

@@ -77,7 +77,7 @@ pub mod wrapper;
 
 pub use crate::sim2real::SplitMix64;
 pub use about::{About, InfoChannel};
-pub use autoreset::{Autoreset, AutoresetMode, Finals};
+pub use autoreset::{Autoreset, AutoresetMode, Finals, Kept};
 pub use check::{EnvReport, Finding, Rule, check_env};
 pub use checked::Checked;
 pub use env::{Each, Env, Step};

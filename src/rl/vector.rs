@@ -196,6 +196,26 @@ impl<'a> Which<'a> {
         })
     }
 
+    /// Writes their numbers, of `lanes` lanes, into `list`, whatever there was in it: for what does better without a branch a lane.
+    pub fn list(self, lanes: usize, list: &mut Vec<u32>) {
+        match self {
+            Self::All => {
+                list.clear();
+                list.extend(0..lanes as u32);
+            }
+            Self::Mask(mask) => {
+                // A number that is not among them is written over by the next.
+                list.resize(lanes + 1, 0);
+                let mut count = 0;
+                for (lane, among) in mask[..lanes].iter().enumerate() {
+                    list[count] = lane as u32;
+                    count += usize::from(*among);
+                }
+                list.truncate(count);
+            }
+        }
+    }
+
     /// Whether each of eight lanes from lane `first` on is among them: a byte a lane, the first in the lowest.
     fn word(self, first: usize, lanes: usize) -> u64 {
         let count = (lanes - first).min(8);
@@ -322,12 +342,17 @@ mod tests {
 
     #[test]
     fn lanes_of_a_mask_are_those_that_are_true() {
+        let mut list = vec![7; 3];
         for lanes in 0..30 {
             assert!(Which::All.iter(lanes).eq(0..lanes));
+            Which::All.list(lanes, &mut list);
+            assert!(list.iter().map(|lane| *lane as usize).eq(0..lanes));
             for pattern in [0, u64::MAX, 0x8040_2010_0804_0201, 0x0101_0101_0101_0101, 0xdead_beef_1234_5678] {
                 let mask: Vec<bool> = (0..lanes).map(|lane| pattern >> lane & 1 == 1).collect();
                 let which = Which::Mask(&mask);
                 assert!(which.iter(lanes).eq((0..lanes).filter(|lane| mask[*lane])), "{mask:?}");
+                which.list(lanes, &mut list);
+                assert!(list.iter().map(|lane| *lane as usize).eq(which.iter(lanes)), "{mask:?}");
             }
         }
     }

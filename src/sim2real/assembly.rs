@@ -323,7 +323,7 @@ impl<P: Plant> Twin for Assembly<P> {
                 let known = recordings.iter().all(|r| applies(&r.stimulus));
                 if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
                     let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
-                    candidates.push(Candidate { about, form, form_index, finishing, general });
+                    candidates.push(Candidate { about, form, form_index, finishing, general, ages: mechanism.ages() });
                 }
             }
         }
@@ -357,7 +357,8 @@ impl<P: Plant> Twin for Assembly<P> {
             for (form_index, mut form) in mechanism.forms(&Default::default()).into_iter().enumerate() {
                 let Some(values) = mechanism.recognized(form_index, signs) else { continue };
                 form.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.nominal = value);
-                found.push(Candidate { about: mechanism.about(), form, form_index, finishing: false, general: false });
+                let (about, ages) = (mechanism.about(), mechanism.ages());
+                found.push(Candidate { about, form, form_index, finishing: false, general: false, ages });
             }
         }
         found

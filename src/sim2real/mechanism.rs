@@ -165,6 +165,10 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn general(&self, _form: usize) -> bool {
         false
     }
+    /// Whether its law is another one at another time, whatever the plant does meanwhile.
+    fn ages(&self) -> bool {
+        false
+    }
     /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.
     fn recognized(&self, _form: usize, _signs: &Signs) -> Option<Vec<f64>> {
         None

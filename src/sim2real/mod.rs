@@ -17,6 +17,7 @@ pub mod identify;
 mod lane;
 mod lane_run;
 pub mod mechanism;
+pub(crate) mod normal_draw;
 mod parameter;
 mod plant;
 pub mod randomize;

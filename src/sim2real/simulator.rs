@@ -102,6 +102,8 @@ pub struct Candidate {
     pub finishing: bool,
     /// Whether it is a wider law of which a plainer form is one case, and is tried only in the place of that.
     pub general: bool,
+    /// Whether its law is another one at another time, whatever the plant does meanwhile.
+    pub ages: bool,
 }
 
 /// A simulator that can be given mechanisms it lacks.

@@ -14,6 +14,7 @@ use super::Seed;
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Mixes all bits of `z` into all bits.
+#[inline(always)]
 pub(crate) const fn mixed(z: u64) -> u64 {
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -21,22 +22,35 @@ pub(crate) const fn mixed(z: u64) -> u64 {
 }
 
 /// What is far from that of the numbers beside it.
+#[inline]
 pub(crate) const fn scattered(number: u64) -> u64 {
     mixed(number.wrapping_add(GOLDEN))
 }
 
 /// `key` and one number more.
+#[inline]
 pub(crate) const fn with(key: u64, number: u64) -> u64 {
     mixed(key ^ scattered(number).wrapping_mul(GOLDEN))
 }
 
 /// The number in (0, 1), neither end ever, of these bits: one of 2^52, evenly apart.
-#[inline]
+#[inline(always)]
 pub(crate) const fn open_unit(bits: u64) -> f64 {
     // The bits become those of a number from 1 to 2, 2^-52 apart: exact, and sooner done than a conversion.
     const ONE: u64 = 1.0_f64.to_bits();
     const HALF_A_STEP: f64 = 0.5 / (1_u64 << 52) as f64;
     (f64::from_bits(ONE | (bits >> 12)) - 1.0) + HALF_A_STEP
+}
+
+/// The next bits of generators in these states, side by side.
+#[inline(always)]
+pub(crate) fn next_bits<const N: usize>(states: &mut [u64; N]) -> [u64; N] {
+    let mut bits = [0; N];
+    for k in 0..N {
+        states[k] = states[k].wrapping_add(GOLDEN);
+        bits[k] = mixed(states[k]);
+    }
+    bits
 }
 
 /// A generator whose state is a number that counts up. A copy draws the same from here on, by itself.
@@ -56,8 +70,14 @@ impl SplitMix64 {
         Self(state)
     }
 
+    /// The state it is in.
+    #[inline(always)]
+    pub(crate) const fn state(self) -> u64 {
+        self.0
+    }
+
     /// The next 64 bits.
-    #[inline]
+    #[inline(always)]
     pub const fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(GOLDEN);
         mixed(self.0)
@@ -138,6 +158,16 @@ mod tests {
         let mut draws = SplitMix64::new(Seed(3), 17);
         assert!((0..1_000).all(|_| (0.0..1.0).contains(&draws.unit())));
         assert!((0..1_000).all(|_| (-2.0..3.0).contains(&draws.between(-2.0, 3.0))));
+    }
+
+    #[test]
+    fn side_by_side_each_draws_what_it_draws_alone() {
+        let mut alone = [3, 5, u64::MAX].map(|seed| SplitMix64::new(Seed(seed), 17));
+        let mut states = alone.map(SplitMix64::state);
+        for _ in 0..3 {
+            assert_eq!(next_bits(&mut states), [0, 1, 2].map(|k: usize| alone[k].bits()));
+        }
+        assert_eq!(states, alone.map(SplitMix64::state));
     }
 
     #[test]

@@ -29,7 +29,8 @@ class BoundEnvironment:
         As `VectorEnvironment` takes them. Lanes are reset in the step that ends their episode: its reward and flags are those of the
         end, and what is observed is the first observation of the next.
 
-    A loop is then: write `actions`, call ``step()``, read the others.
+    A loop is then: write `actions`, call ``step()``, read the others. What was observed last of an episode is not kept; `VectorEnvironment`
+    tells it.
     """
 
     def __init__(
@@ -83,9 +84,7 @@ class BoundEnvironment:
 
     def step(self, actions: np.ndarray | None = None):
         """Take a step by the buffer of actions, into which `actions` are written before where they are given: all buffers, and no info."""
-        if actions is not None:
-            self.actions[...] = actions
-        self._step()
+        self._step(actions)
         return self._told
 
     def close(self) -> None:

@@ -63,7 +63,10 @@ class Environment(gymnasium.Env):
         self.about: dict[str, Any] = self._lanes.about()
         self.observation_space = spaces.box(self.about["observation"])
         self.action_space = spaces.action(self.about["action"])
-        self._read = spaces.ActionReader(self.action_space, None)
+        self._lanes.reader = self._read = spaces.ActionReader(self.action_space, None)
+        if type(self).step is Environment.step:
+            # What a step is, without a call of Python on the way to it; a subclass with a step of its own keeps that.
+            self.step = self._lanes.step_one
         self._seeded = False
         self._flags = (np.empty(1, np.float64), np.empty(1, np.bool_), np.empty(1, np.bool_))
 
@@ -83,7 +86,7 @@ class Environment(gymnasium.Env):
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Take a step: observation, reward, terminated, truncated, info."""
-        return self._lanes.step_one(action, self._read)
+        return self._lanes.step_one(action)
 
     def step_into(self, action: Any, observation: np.ndarray) -> tuple[float, bool, bool]:
         """Take a step, and write what is observed into `observation`: reward, terminated, truncated."""

@@ -85,4 +85,4 @@ class StableBaselines(VecEnv):
     def _chosen(self, indices: None | int | Iterable[int]) -> Sequence[int]:
         if indices is None:
             return range(self.num_envs)
-        return [indices] if isinstance(indices, int) else list(indices)
+        return [indices] if isinstance(indices, (int, np.integer)) else list(indices)

@@ -83,6 +83,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._read = spaces.ActionReader(self.single_action_space, self.num_envs)
         self._informs = bool(info) and bool(self.about["info"])
+        self._lanes.informs = self._informs
         self._seeded = np.zeros(self.num_envs, np.bool_)
 
     def reset(

@@ -300,21 +300,27 @@ impl Course {
 
     /// The value of an info channel that every market environment has.
     fn tell(&self, channel: usize, steps: u32) -> f64 {
-        let Ok(view) = self.session.seen(self.event) else { return f64::NAN };
         let blotter = self.session.blotter();
-        let count = view.instruments().len();
+        match channel {
+            3 => blotter.orders.len() as f64,
+            4 => blotter.fills.len() as f64,
+            5 => blotter.rejected.values().sum::<usize>() as f64,
+            7 => self.event.time.0 as f64 / Timestamp::NANOS as f64,
+            8 => self.session.events() as f64,
+            9 => f64::from(steps),
+            10 => f64::from(self.ended as u8),
+            _ => self.tell_of_account(channel),
+        }
+    }
+
+    /// The same of those for which the account is looked at, which takes longer.
+    fn tell_of_account(&self, channel: usize) -> f64 {
+        let Ok(view) = self.session.seen(self.event) else { return f64::NAN };
         match channel {
             0 => view.equity().to_f64(),
             1 => view.cash().to_f64(),
             2 => super::portfolio::fees(&view),
-            3 => blotter.orders.len() as f64,
-            4 => blotter.fills.len() as f64,
-            5 => blotter.rejected.values().sum::<usize>() as f64,
-            6 => (0..count).filter(|k| view.halt(*k).is_some()).count() as f64,
-            7 => self.event.time.0 as f64 / Timestamp::NANOS as f64,
-            8 => self.session.events() as f64,
-            9 => f64::from(steps),
-            _ => f64::from(self.ended as u8),
+            _ => (0..view.instruments().len()).filter(|k| view.halt(*k).is_some()).count() as f64,
         }
     }
 }

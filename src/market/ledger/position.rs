@@ -33,6 +33,15 @@ impl Position {
         }
     }
 
+    /// By how much it is worth more at `price` than at its mark.
+    #[inline]
+    pub(super) fn change_to(&self, price: Price) -> Result<Cash, MoneyError> {
+        match (self.multiplier, price.0.checked_sub(self.mark.unwrap_or_default().0)) {
+            (Multiplier(1), Some(moved)) => Ok(Price(moved) * self.quantity),
+            _ => self.amount(price, self.quantity)?.minus(self.value()),
+        }
+    }
+
     /// What `quantity` of it is worth at `price`.
     pub(super) fn amount(&self, price: Price, quantity: Quantity) -> Result<Cash, MoneyError> {
         match self.multiplier {

@@ -5,6 +5,7 @@
 //! step is with a strategy that asks at once: nothing happens between what a strategy is shown and what it asks for.
 
 use crate::market::equity_curve::reuse;
+use crate::market::spare::Rows;
 use crate::market::venue::Others;
 use crate::market::{Blotter, DepthBook, Event, MoneyError, Price, Side, View};
 
@@ -49,11 +50,17 @@ impl Session {
 
     /// Goes on in the memory of a session that is over.
     pub(in crate::market) fn reuse(&mut self, over: &mut Self) {
-        self.equity.reuse(&mut over.equity);
-        let (own, over) = (&mut self.blotter, &mut over.blotter);
-        reuse(&mut own.orders, &mut over.orders);
-        reuse(&mut own.fills, &mut over.fills);
-        reuse(&mut own.terms, &mut over.terms);
+        let (equity, blotter) = (over.equity.take_points(), &mut over.blotter);
+        let (orders, fills) = (std::mem::take(&mut blotter.orders), std::mem::take(&mut blotter.fills));
+        self.go_on_in(Rows { equity, orders, fills, terms: std::mem::take(&mut blotter.terms) });
+    }
+
+    /// Goes on in the memory of rows that nobody reads any more.
+    pub(in crate::market) fn go_on_in(&mut self, over: Rows) {
+        self.equity.reuse(over.equity);
+        reuse(&mut self.blotter.orders, over.orders);
+        reuse(&mut self.blotter.fills, over.fills);
+        reuse(&mut self.blotter.terms, over.terms);
     }
 
     /// Before the first event: the book of an instrument is there already, as the rows before the first made it.

@@ -5,6 +5,8 @@
 
 use std::sync::Arc;
 
+use crate::market::feed::BarsAlone;
+use crate::market::sources::RowKind;
 use crate::market::{BacktestError, Strategy};
 use crate::sim2real::Timestamp;
 
@@ -29,9 +31,9 @@ impl Session {
     }
 
     /// Whether there is nothing in this run that wants to be looked for at every event: delays of data, hours of trading, and
-    /// what happens to an account. Without bars in memory there is no such stretch.
+    /// what happens to an account. Without bars there is no such stretch.
     pub(super) fn may_be_quiet(&self) -> bool {
-        self.feed.lines().iter().any(|line| line.all_bars().is_some_and(|bars| !bars.is_empty()))
+        self.feed.lines().iter().any(|line| line.tells(RowKind::Bars))
             && self.direct
             && self.timetable.is_empty()
             && self.keeping.is_none()
@@ -41,7 +43,10 @@ impl Session {
     /// Shows the strategy the bars of a quiet stretch, up to the first after which something is due.
     #[inline]
     fn pass_quiet_bars(&mut self, strategy: &mut dyn Strategy, last: usize) -> Result<(), BacktestError> {
-        let Some((instrument, bars, next, others)) = self.feed.bars_alone() else { return Ok(()) };
+        let Some(BarsAlone { instrument, bars, next, end: others }) = self.feed.bars_alone() else { return Ok(()) };
+        if next.is_empty() {
+            return Ok(());
+        }
         let floor = &self.venue.floors[instrument];
         if !floor.is_idle() || !floor.is_quiet() {
             return Ok(());
@@ -52,19 +57,22 @@ impl Session {
         // What is held is charged at the first event of a day.
         let day = if self.venue.charges.is_empty() { Timestamp::MAX } else { self.carry.next };
         let (end, most) = (others.min(due).min(shown).min(day), last.saturating_sub(self.held.events));
-        let mut passed = 0;
-        let mut asked = Ok(false);
-        for bar in bars[next..].iter().take(most).take_while(|bar| bar.known_at < end) {
+        let (mut passed, mut shown) = (0, Ok(()));
+        for bar in bars[next].iter().take(most).take_while(|bar| bar.known_at < end) {
             passed += 1;
-            asked = self.show_bar(instrument, bar, strategy);
-            if !matches!(asked, Ok(false)) {
-                break;
+            match self.show_bar(instrument, bar, strategy) {
+                Ok(false) => {}
+                Ok(true) => break,
+                Err(error) => {
+                    shown = Err(error);
+                    break;
+                }
             }
         }
         if passed > 0 {
             self.rows += passed;
             self.feed.skip_bars(passed);
         }
-        asked.map(|_| ())
+        shown
     }
 }

@@ -53,7 +53,9 @@ impl Session {
         let known = &mut self.known[instrument];
         known.keep = strategy.lookback().max(1);
         known.bars.push(*bar, known.keep);
-        self.value(event, bar.close, bar.volume).map_err(|error| self.money(event, error))?;
+        known.mark = Some(bar.close);
+        self.daily[instrument].see(event.time, bar.close, bar.volume);
+        self.ledger.mark(instrument, bar.close).map_err(|error| self.money(event, error))?;
         let equity = self.ask(event, strategy)?;
         let asks = !self.orders.requests().is_empty();
         if asks {

@@ -48,6 +48,7 @@ impl Fault {
     }
 
     /// A cell of `column` without a value.
+    #[cold]
     pub(super) fn missing(column: &str, what: &'static str) -> Self {
         let column = column.to_owned();
         Self::new(Finding::Missing, move |table, row| table.missing(&column, row, what))
@@ -111,31 +112,53 @@ pub(in crate::market) struct Kept<T> {
     pub(super) max_gap: Option<i64>,
     pub(super) notes: DataNotes,
     pub(super) sequence: Sequence<T>,
-    /// Where the row stands that was known latest of all so far.
+    /// Where the row stands that was known latest of all so far: in a table before, or in the one at hand.
     newest_at: Place,
+    newest_row: Option<usize>,
     last: Option<T>,
 }
 
 impl<T: Dated + Clone + PartialEq> Kept<T> {
     pub(super) fn new(notes: DataNotes, on_bad: OnBad, reorder: Option<i64>, max_gap: Option<i64>) -> Self {
-        Self { on_bad, max_gap, notes, sequence: Sequence::new(reorder), newest_at: Place::File, last: None }
+        Self {
+            on_bad,
+            max_gap,
+            notes,
+            sequence: Sequence::new(reorder),
+            newest_at: Place::File,
+            newest_row: None,
+            last: None,
+        }
     }
 
     /// Gives out the rows before which none can come any more; at the `end` all that are left.
     pub(super) fn give(&mut self, end: bool, into: &mut dyn FnMut(T)) {
         while let Some(row) = self.sequence.pop(end) {
-            if let Some(before) = &self.last {
-                if row.time() < before.time() {
-                    self.notes.found(Finding::ClockBack);
-                }
-                if row == *before {
-                    self.notes.found(Finding::Repeated);
-                }
-            }
-            self.notes.gave(row.known_at(), self.max_gap);
-            self.last = Some(row.clone());
-            into(row);
+            self.give_one(row, into);
         }
+    }
+
+    /// `table` has been read: of its rows the place of the newest is kept.
+    pub(super) fn leave(&mut self, table: &Table) {
+        if let Some(row) = self.newest_row.take() {
+            self.newest_at = table.place(row);
+        }
+    }
+
+    /// Gives out the next row.
+    #[inline(always)]
+    fn give_one(&mut self, row: T, into: &mut dyn FnMut(T)) {
+        if let Some(before) = &self.last {
+            if row.time() < before.time() {
+                self.notes.found(Finding::ClockBack);
+            }
+            if row == *before {
+                self.notes.found(Finding::Repeated);
+            }
+        }
+        self.notes.gave(row.known_at(), self.max_gap);
+        self.last = Some(row.clone());
+        into(row);
     }
 }
 
@@ -146,26 +169,48 @@ impl<T: Dated + Clone + PartialEq> Emit<'_, T> {
     }
 
     /// The value, if there is one: a fault is an error or counted, as the policy has it.
+    #[inline(always)]
     pub(super) fn sound<V>(&mut self, row: usize, value: Result<V, Fault>) -> Result<Option<V>, InputError> {
         match value {
             Ok(value) => Ok(Some(value)),
-            Err(fault) if self.rows.on_bad == OnBad::Refuse => Err(fault.at(self.table, row)),
-            Err(fault) => {
-                self.rows.notes.found(fault.finding);
-                Ok(None)
-            }
+            Err(fault) => self.unsound(row, &fault).map(|()| None),
         }
     }
 
+    #[cold]
+    fn unsound(&mut self, row: usize, fault: &Fault) -> Result<(), InputError> {
+        if self.rows.on_bad == OnBad::Refuse {
+            return Err(fault.at(self.table, row));
+        }
+        self.rows.notes.found(fault.finding);
+        Ok(())
+    }
+
     /// Takes what came of data row `row` of the table.
+    #[inline(always)]
     pub(super) fn push(&mut self, row: usize, item: T) -> Result<(), InputError> {
+        if self.rows.sequence.passes(item.known_at()) {
+            self.rows.newest_row = Some(row);
+            self.rows.give_one(item, self.into);
+            return Ok(());
+        }
+        self.put_in_order(row, item)
+    }
+
+    /// Takes what came of several data rows, each with its number.
+    pub(super) fn push_all(&mut self, rows: &[(usize, T)]) -> Result<(), InputError> {
+        rows.iter().try_for_each(|(row, item)| self.push(*row, item.clone()))
+    }
+
+    fn put_in_order(&mut self, row: usize, item: T) -> Result<(), InputError> {
         let known_at = item.known_at();
         let newest = self.rows.sequence.newest();
         match self.rows.sequence.push(item) {
-            Placed::Last => self.rows.newest_at = self.table.place(row),
+            Placed::Last => self.rows.newest_row = Some(row),
             Placed::Between => self.rows.notes.found(Finding::Reordered),
             Placed::Late => {
-                let (column, before_at) = (self.order_column.to_owned(), self.rows.newest_at);
+                let newest_at = self.rows.newest_row.map_or(self.rows.newest_at, |row| self.table.place(row));
+                let (column, before_at) = (self.order_column.to_owned(), newest_at);
                 let late = move |table: &Table, row: usize| {
                     not_increasing(table, &column, row, &known_at, (&newest, before_at), Increase::OrStays)
                 };
@@ -179,13 +224,23 @@ impl<T: Dated + Clone + PartialEq> Emit<'_, T> {
 }
 
 /// The number in a cell of a column that must be complete.
+#[inline(always)]
 pub(super) fn number(column: &str, values: &[Option<f64>], row: usize) -> Result<f64, Fault> {
     values.get(row).copied().flatten().ok_or_else(|| Fault::missing(column, "a number"))
 }
 
 /// The price in such a cell, in `scale` [currency]: above 0.
+#[inline(always)]
 pub(super) fn price(column: &str, values: &[Option<f64>], row: usize, scale: f64) -> Result<Price, Fault> {
     let value = number(column, values, row)?;
+    match Price::nearest(value * scale) {
+        Ok(price) if value > 0.0 => Ok(price),
+        _ => no_price(column, value, scale),
+    }
+}
+
+#[cold]
+fn no_price(column: &str, value: f64, scale: f64) -> Result<Price, Fault> {
     if value <= 0.0 {
         let hint = "drop the row, or name the column that holds the price in `columns`";
         return Err(Fault::cell(Finding::Price, column, "expected a price greater than 0", value, hint));
@@ -213,6 +268,7 @@ pub(super) fn size(column: &str, values: &[Option<f64>], row: usize, scale: f64)
 }
 
 /// The time in a cell of a column that must be complete.
+#[inline(always)]
 pub(super) fn time(column: &str, values: &[Option<Timestamp>], row: usize) -> Result<Timestamp, Fault> {
     values.get(row).copied().flatten().ok_or_else(|| Fault::missing(column, "a time"))
 }

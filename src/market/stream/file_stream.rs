@@ -131,7 +131,9 @@ pub(super) fn decode<T: Dated + Clone + PartialEq>(
     into: &mut dyn FnMut(T),
 ) -> Result<(), InputError> {
     rows.notes.read(table.rows() as u64);
-    decode.decode(table, &mut Emit { table, order_column, rows, into })
+    decode.decode(table, &mut Emit { table, order_column, rows, into })?;
+    rows.leave(table);
+    Ok(())
 }
 
 /// Gives out what was held back; `until` is the time up to which there should be data, beside the longest gap that is none [ns].
@@ -158,6 +160,9 @@ impl FileStream<Known<Book>> {
     }
 }
 
+/// Rows of a table in memory that are decoded at once: their columns fit into the cache of a core.
+pub(in crate::market) const PIECE: usize = 1 << 12;
+
 /// The bars of a table that is in memory as a whole.
 pub(in crate::market) fn bars_of(
     table: &Table,
@@ -169,7 +174,9 @@ pub(in crate::market) fn bars_of(
     let mut kept = Kept::new(DataNotes::of(FeedKind::Bars.word()), rules.on_bad, None, rules.max_gap);
     let mut bars = Vec::with_capacity(table.rows());
     let order_column = BarRows::time_column(format);
-    decode(table, &mut reader, order_column, &mut kept, &mut |bar| bars.push(bar))?;
+    for piece in table.pieces(PIECE) {
+        decode(&piece, &mut reader, order_column, &mut kept, &mut |bar| bars.push(bar))?;
+    }
     finish(&mut reader, &mut kept, (rules.until, rules.max_gap), &mut |bar| bars.push(bar));
     Ok((bars, kept.notes))
 }

@@ -35,6 +35,17 @@ impl<T: Dated> Sequence<T> {
         Self { window, held: VecDeque::new(), newest: Timestamp::MIN }
     }
 
+    /// Whether a row that is known at `known_at` goes on at once, and is then the newest: nothing is held back, none may come before
+    /// it, and it is not late. Nearly all rows are such.
+    #[inline(always)]
+    pub(super) fn passes(&mut self, known_at: Timestamp) -> bool {
+        let passes = self.window == 0 && known_at >= self.newest && self.held.is_empty();
+        if passes {
+            self.newest = known_at;
+        }
+        passes
+    }
+
     /// Takes a row. Those of one time stay in the order in which they came.
     pub(super) fn push(&mut self, row: T) -> Placed {
         let known_at = row.known_at();
@@ -81,8 +92,17 @@ mod tests {
         let mut sequence = Sequence::new(window);
         let (mut given, mut placed) = (Vec::new(), Vec::new());
         for row in rows {
+            let before = given.len();
+            let mut other = Sequence { held: sequence.held.clone(), ..sequence };
             placed.push(sequence.push(Row(*row, ' ')));
+            // What passes is what is put last and given out at once.
+            let passed = other.passes(Timestamp(*row));
             given.extend(std::iter::from_fn(|| sequence.pop(false)).map(|row| row.0));
+            assert!(
+                !passed
+                    || (placed.last(), &given[before..], other.newest) == (Some(&Placed::Last), &[*row], sequence.newest)
+            );
+            assert!(passed || window.is_some() || placed.last() == Some(&Placed::Late));
         }
         given.extend(std::iter::from_fn(|| sequence.pop(true)).map(|row| row.0));
         (given, placed)

@@ -129,7 +129,9 @@ impl Sweep<'_> {
 fn outcome(backtest: &Result<Backtest, String>, strategy: &mut dyn Strategy) -> Outcome {
     let ran = backtest.as_ref().map_err(Clone::clone).and_then(|backtest| {
         let record = backtest.run(strategy).map_err(|error| error.to_string())?;
-        Metrics::of(&record).map_err(|error| error.to_string())
+        let metrics = Metrics::of(&record).map_err(|error| error.to_string());
+        backtest.recycle(record);
+        metrics
     });
     match ran {
         Ok(metrics) => Outcome::Done { metrics: figures(&metrics) },

@@ -46,18 +46,19 @@ impl Floor {
 
     /// What becomes of an order when it has, or has not, been offered to the market.
     fn meet_at(&mut self, k: usize, offer: &Offer, takes: bool, first_of_session: bool) {
-        let order = self.resting[k];
-        if takes && order.condition == Condition::PostOnly {
+        let (tradable, time_in_force) = (self.resting[k].tradable(), self.resting[k].time_in_force);
+        if takes && self.resting[k].condition == Condition::PostOnly {
             return self.end(k, offer.at, Reason::PostOnly);
         }
         // With bars all the volume there is stands at the price: a cap alone can leave something over.
-        let room = self.room(k, offer);
-        let whole = order.time_in_force != TimeInForce::FillOrKill
-            || room >= order.tradable() && self.within_limit(k, offer, room) >= order.tradable();
+        let whole = time_in_force != TimeInForce::FillOrKill || {
+            let room = self.room(k, offer);
+            room >= tradable && self.within_limit(k, offer, room) >= tradable
+        };
         if takes && whole {
-            self.take(k, offer, order.tradable());
+            self.take(k, offer, tradable);
         }
-        let order = self.resting[k];
+        let order = &self.resting[k];
         if order.left <= Quantity::ZERO {
             return;
         }

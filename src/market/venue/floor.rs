@@ -293,6 +293,9 @@ impl Floor {
 
     /// What the fill of one order does to those it is linked with.
     fn settle_links(&mut self, id: OrderId, link: Link, quantity: Quantity, at: Timestamp) {
+        if self.resting.len() == 1 {
+            return; // Nobody else is there, as nearly always.
+        }
         let (mut over, mut released) = (Vec::new(), Vec::new());
         for (k, order) in self.resting.iter_mut().enumerate().filter(|(_, order)| order.id != id) {
             if order.link == (Link::ChildOf { parent: id }) {
@@ -318,9 +321,10 @@ impl Floor {
 
     /// Takes order `k` off the floor for `reason`, and its children, which then wait for nothing.
     pub(super) fn end(&mut self, k: usize, at: Timestamp, reason: Reason) {
-        let order = self.resting[k];
-        self.resting[k].left = Quantity::ZERO;
-        self.tell(order.id, at, What::Ended(reason));
+        let order = &mut self.resting[k];
+        order.left = Quantity::ZERO;
+        let id = order.id;
+        self.tell(id, at, What::Ended(reason));
     }
 
     /// Clears away the orders that are over, and what children wait for that their parents never fill.

@@ -222,8 +222,10 @@ struct Fast {
     lanes: CartPoleLanes,
     parameters: LaneParameters,
     episodes: Episodes,
-    timing: Timing,
     wires: Wires,
+    /// The lanes that are being reset, and the episodes they begin.
+    due: Vec<u32>,
+    begun: Vec<Episode>,
 }
 
 impl Fast {
@@ -231,11 +233,13 @@ impl Fast {
         let Setting { assembly, randomization } = setting;
         let all: &[Parameter] = assembly.parameters();
         let values: Vec<f64> = all.iter().map(|p| p.nominal).collect();
-        let own = randomization.is_some();
+        let places = randomization.as_ref().map(|r| r.places.clone()).unwrap_or_default();
         let parameters = LaneParameters::new(all, randomization, count);
         let about = described(about, &parameters, timing, |unit| assembly.unit(unit));
-        let lanes = CartPoleLanes::new(count, &values, own, wires, STEP, task.thresholds);
-        Self { about, task, lanes, parameters, episodes: Episodes::new(count), timing, wires }
+        let differs = |place: usize| places.contains(&place);
+        let lanes = CartPoleLanes::new(count, &values, differs, wires, (timing.seconds, timing.max_steps), task.thresholds);
+        let episodes = Episodes::new(count);
+        Self { about, task, lanes, parameters, episodes, wires, due: Vec::new(), begun: Vec::new() }
     }
 }
 
@@ -257,21 +261,23 @@ impl VecEnv for Fast {
     ) -> Result<(), EnvError> {
         let (start, level) = start_of(&self.about, options)?;
         check_start(&start)?;
-        let drawn = self.parameters.any();
-        for lane in which.iter(self.lanes()) {
-            let episode = self.episodes.begin_lane(lane, seeds.map(|seeds| seeds[lane]));
-            let state = started(episode, start_between(&start));
-            let values = drawn.then(|| self.parameters.begin(lane, episode, level));
-            let seen = self.lanes.begin(lane, episode, state, values);
-            observations[4 * lane..][..4].copy_from_slice(&seen);
+        let Self { lanes, parameters, episodes, due, begun, .. } = self;
+        which.list(lanes.count(), due);
+        begun.clear();
+        begun.extend(due.iter().map(|lane| {
+            let lane = *lane as usize;
+            episodes.begin_lane(lane, seeds.map(|seeds| seeds[lane]))
+        }));
+        if parameters.any() {
+            parameters.begin_all(due, begun, level);
+            due.iter().for_each(|lane| lanes.retune(*lane as usize, parameters.whole(*lane as usize)));
         }
+        lanes.begin(due, begun, start_between(&start), observations);
         Ok(())
     }
 
     fn step(&mut self, actions: Actions<'_>, out: &mut Out<'_>) -> Result<(), EnvError> {
-        self.lanes.step(actions.discrete(), out.observations, out.terminated);
-        let max = self.timing.max_steps;
-        out.truncated.iter_mut().zip(&self.lanes.steps).for_each(|(truncated, steps)| *truncated = *steps >= max);
+        self.lanes.step(actions.discrete(), out);
         if self.task.sutton_barto {
             let rewards = out.rewards.iter_mut().zip(&*out.terminated);
             rewards.for_each(|(reward, terminated)| *reward = self.task.reward(*terminated));
@@ -290,7 +296,7 @@ impl VecEnv for Fast {
     }
 
     fn copy_lane(&mut self, from: usize, to: usize) {
-        self.lanes.copy(from, to);
+        self.lanes.copy(None, from, to);
         self.parameters.copy(None, from, to);
         copy_episode(&mut self.episodes, None, from, to);
     }
@@ -301,7 +307,7 @@ impl VecEnv for Fast {
             let why = "it has other mechanisms, or randomizes others".to_owned();
             return Err(EnvError::Unlike { id: ID.into(), why });
         }
-        self.lanes.copy_from(&other.lanes, from, to);
+        self.lanes.copy(Some(&other.lanes), from, to);
         self.parameters.copy(Some(&other.parameters), from, to);
         copy_episode(&mut self.episodes, Some(&other.episodes), from, to);
         Ok(())

@@ -1,4 +1,4 @@
-//! Many cart-poles side by side, in blocks that compilers turn into vector instructions: what most training runs step.
+//! Many cart-poles side by side, in loops over lanes that compilers turn into vector instructions: what most training runs step.
 //!
 //! Beside the plain task they have parameters of their own, a delay of the command, and noise of the position's sensor, by the laws
 //! of `sim2real::mechanism`; whatever else there may be is run by [`Simulated`](super::simulated::Simulated).
@@ -6,84 +6,13 @@
 #![allow(clippy::needless_range_loop, reason = "one index for many rows is what becomes vector instructions")]
 
 use pulp::{Arch, NullaryFnOnce};
-use rand_distr::{Distribution, StandardNormal};
 
 use super::cart_pole::{START, Thresholds};
-use super::cart_pole_wires::{Delay, LONGEST_DELAY, Noise, Wires, plain};
-use crate::rl::Episode;
-use crate::robot::sine::sine;
-use crate::sim2real::{Seed, SplitMix64};
-
-/// Lanes that are stepped at once.
-pub(super) const BLOCK: usize = 8;
-
-/// One number for each lane of a block.
-pub(super) type Row = [f64; BLOCK];
-
-/// Cart position [m] and velocity [m/s], pole angle [rad] and angular velocity [rad/s].
-#[derive(Debug, Clone, Copy, Default)]
-struct State {
-    position: Row,
-    velocity: Row,
-    angle: Row,
-    spin: Row,
-}
-
-/// The parameters of a block as the equations have them. With a cart of mass `M`, a pole of mass `m` and half length `l`:
-#[derive(Debug, Clone, Copy)]
-struct Constants {
-    /// `M + m` [kg].
-    mass: Row,
-    /// `0.75 m` [kg].
-    swinging: Row,
-    /// `m l` [kg m].
-    lever: Row,
-    /// `m g` [N].
-    weight: Row,
-    /// `c / l` of the hinge's friction `c` [N s/rad].
-    hinge: Row,
-    /// Friction of the cart [N s/m].
-    friction: Row,
-    /// `0.75 / l` [1/m].
-    turning: Row,
-    /// `1 / m` [1/kg].
-    lightness: Row,
-    /// Gain [N per unit of command].
-    gain: Row,
-}
-
-impl Constants {
-    /// Sets lane `k` to these values of [`CartPole`](crate::robot::CartPole)'s parameters.
-    fn set(&mut self, k: usize, values: &[f64]) {
-        let [cart, pole, half, gravity, friction, hinge, gain] = std::array::from_fn(|k| values[k]);
-        self.mass[k] = cart + pole;
-        self.swinging[k] = 0.75 * pole;
-        self.lever[k] = pole * half;
-        self.weight[k] = pole * gravity;
-        self.hinge[k] = hinge / half;
-        self.friction[k] = friction;
-        self.turning[k] = 0.75 / half;
-        self.lightness[k] = 1.0 / pole;
-        self.gain[k] = gain;
-    }
-
-    fn of(values: &[f64]) -> Self {
-        let row = [0.0; BLOCK];
-        let mut new = Self {
-            mass: row,
-            swinging: row,
-            lever: row,
-            weight: row,
-            hinge: row,
-            friction: row,
-            turning: row,
-            lightness: row,
-            gain: row,
-        };
-        (0..BLOCK).for_each(|k| new.set(k, values));
-        new
-    }
-}
+use super::cart_pole_motion::{Constants, SMALL_TILE, TILE, advance};
+use super::cart_pole_wires::{Delay, Noise, Wires, plain};
+use crate::rl::{Episode, Out};
+use crate::sim2real::Seed;
+use crate::sim2real::normal_draw::AT_ONCE;
 
 /// What lanes begin with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,149 +24,139 @@ pub(super) struct Start {
 }
 
 /// The state of an episode at its start.
+#[inline(always)]
 pub(super) fn started(episode: Episode, start: Start) -> [f64; 4] {
     let mut draws = episode.stream(START);
     std::array::from_fn(|_| draws.between(start.low, start.high))
 }
 
-/// Cart-poles by Euler's method, `count` of them.
+/// Cart-poles by Euler's method.
 #[derive(Debug, Clone)]
 pub(super) struct CartPoleLanes {
-    count: usize,
-    states: Vec<State>,
-    /// Of each block, or one for all where lanes do not differ.
-    constants: Vec<Constants>,
+    /// Cart position [m] and velocity [m/s], pole angle [rad] and angular velocity [rad/s].
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    angle: Vec<f64>,
+    spin: Vec<f64>,
+    /// Steps of each lane's episode.
+    steps: Vec<u32>,
+    constants: Constants,
     delay: Option<Delay>,
     noise: Option<Noise>,
     wires: Wires,
-    /// Steps of each lane's episode.
-    pub steps: Vec<u32>,
     step: f64,
-    pub thresholds: Thresholds,
+    max_steps: u32,
+    thresholds: Thresholds,
 }
 
 impl CartPoleLanes {
-    /// `count` lanes with `values` of all parameters, in steps of `step` [s]. Where `own`, each lane may have values of its own.
-    pub fn new(count: usize, values: &[f64], own: bool, wires: Wires, step: f64, thresholds: Thresholds) -> Self {
-        let blocks = count.div_ceil(BLOCK);
-        let padded = blocks * BLOCK;
-        let key = Seed(0).child("noise").0;
-        let delay = wires.delay.map(|_| Delay { past: vec![0; padded], steps: vec![0; padded], rest: vec![0.0; padded] });
-        let draws = || vec![SplitMix64::new(Seed(0), key); padded];
-        let noise = wires.noise.map(|_| Noise { std: vec![0.0; padded], draws: draws(), key });
-        let states = vec![State::default(); blocks];
-        let constants = vec![Constants::of(values); if own { blocks } else { 1 }];
-        let mut lanes = Self { count, states, constants, delay, noise, wires, steps: vec![0; padded], step, thresholds };
+    /// `count` lanes with `values` of all parameters, in steps of `step` [s], of which an episode has `max_steps`. Of the parameters
+    /// for which `differs` each lane may have values of its own.
+    pub fn new(
+        count: usize,
+        values: &[f64],
+        differs: impl Fn(usize) -> bool,
+        wires: Wires,
+        (step, max_steps): (f64, u32),
+        thresholds: Thresholds,
+    ) -> Self {
+        let zeros = || vec![0.0; count];
+        let mut lanes = Self {
+            position: zeros(),
+            velocity: zeros(),
+            angle: zeros(),
+            spin: zeros(),
+            steps: vec![0; count],
+            constants: Constants::new(values, count, differs),
+            delay: wires.delay.map(|_| Delay::new(count)),
+            noise: wires.noise.map(|_| Noise::new(count)),
+            wires,
+            step,
+            max_steps,
+            thresholds,
+        };
         (0..count).for_each(|lane| lanes.wire(lane, values));
         lanes
     }
 
     /// Sets what the mechanisms' parameters say of lane `lane`.
+    #[inline]
     fn wire(&mut self, lane: usize, values: &[f64]) {
         if let (Some(place), Some(delay)) = (self.wires.delay, &mut self.delay) {
-            let steps = (values[place] / self.step).min(LONGEST_DELAY);
-            delay.steps[lane] = steps.floor() as u32;
-            delay.rest[lane] = steps.fract();
+            delay.set(lane, values[place] / self.step);
         }
         if let (Some(place), Some(noise)) = (self.wires.noise, &mut self.noise) {
-            noise.std[lane] = values[place];
+            noise.set(lane, values[place]);
         }
     }
 
-    /// Begins `episode` in lane `lane`, from `state`; `values`, where lanes differ, are those of all its parameters. Gives what is
-    /// observed of it.
-    pub fn begin(&mut self, lane: usize, episode: Episode, state: [f64; 4], values: Option<&[f64]>) -> [f32; 4] {
-        let (block, k) = (lane / BLOCK, lane % BLOCK);
-        if let Some(values) = values {
-            self.constants[block].set(k, values);
-            self.wire(lane, values);
-        }
-        let own = &mut self.states[block];
-        [own.position[k], own.velocity[k], own.angle[k], own.spin[k]] = state;
-        self.steps[lane] = 0;
-        let mut seen = state;
-        if let Some(noise) = &mut self.noise {
-            noise.draws[lane] = SplitMix64::new(episode.seed(), noise.key);
-            let draw: f64 = StandardNormal.sample(&mut noise.draws[lane]);
-            seen[0] += noise.std[lane] * draw;
-        }
-        seen.map(|value| value as f32)
+    /// Sets all parameters of lane `lane` to `values`, before its episode begins.
+    #[inline]
+    pub fn retune(&mut self, lane: usize, values: &[f64]) {
+        self.constants.set(lane, values);
+        self.wire(lane, values);
     }
 
-    /// The state of lane `lane`.
-    pub fn state(&self, lane: usize) -> [f64; 4] {
-        let (own, k) = (&self.states[lane / BLOCK], lane % BLOCK);
-        [own.position[k], own.velocity[k], own.angle[k], own.spin[k]]
+    /// Begins these episodes in `lanes`, as many, and writes what is observed of them to their rows of `observations`.
+    pub fn begin(&mut self, lanes: &[u32], episodes: &[Episode], start: Start, observations: &mut [f32]) {
+        Arch::new().dispatch(Begun { own: self, lanes, episodes, start, observations });
     }
 
     /// Writes component `which` of the state, one a lane.
     pub fn tell(&self, which: usize, values: &mut [f64]) {
-        for (state, values) in self.states.iter().zip(values.chunks_mut(BLOCK)) {
-            let row = [&state.position, &state.velocity, &state.angle, &state.spin][which];
-            values.copy_from_slice(&row[..values.len()]);
-        }
+        values.copy_from_slice([&self.position, &self.velocity, &self.angle, &self.spin][which]);
     }
 
-    /// Takes a step in all lanes by `actions`, 0 or 1 each, and writes what is observed and whether the episode is over. With the widest
-    /// vectors the processor has: the bits are the same with any.
-    pub fn step(&mut self, actions: &[i64], observations: &mut [f32], terminated: &mut [bool]) {
-        Arch::new().dispatch(Stepped { lanes: self, actions, observations, terminated });
-        self.rest();
-    }
-
-    /// Puts what only fills the last block back to rest: nobody resets it, and long angles take long.
-    fn rest(&mut self) {
-        let filled = self.count % BLOCK;
-        if filled > 0
-            && let Some(last) = self.states.last_mut()
-        {
-            for row in [&mut last.position, &mut last.velocity, &mut last.angle, &mut last.spin] {
-                row[filled..].fill(0.0);
-            }
-        }
+    /// Takes a step in all lanes by `actions`, 0 or 1 each, and writes what comes of it but rewards. With the widest vectors the processor
+    /// has: the bits are the same with any.
+    pub fn step(&mut self, actions: &[i64], out: &mut Out<'_>) {
+        Arch::new().dispatch(Stepped { lanes: self, actions, out: out.again() });
     }
 
     /// Number of lanes.
     pub fn count(&self) -> usize {
-        self.count
+        self.steps.len()
     }
 
-    /// Makes lane `to` a copy of lane `from`.
-    pub fn copy(&mut self, from: usize, to: usize) {
-        let mut one = self.one();
-        one.copy_from(self, from, 0);
-        self.copy_from(&one, 0, to);
-    }
-
-    /// A block of the same kind.
-    fn one(&self) -> Self {
-        let constants = vec![self.constants[0]];
-        let delay =
-            self.delay.as_ref().map(|_| Delay { past: vec![0; BLOCK], steps: vec![0; BLOCK], rest: vec![0.0; BLOCK] });
-        let noise = self.noise.as_ref().map(|noise| Noise {
-            std: vec![0.0; BLOCK],
-            draws: vec![SplitMix64::new(Seed(0), noise.key); BLOCK],
-            key: noise.key,
-        });
-        let (states, steps) = (vec![State::default(); 1], vec![0; BLOCK]);
-        Self { count: 1, states, constants, delay, noise, steps, ..*self }
-    }
-
-    /// Makes lane `to` a copy of lane `from` of `other`.
-    pub fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
-        let (block, k) = (to / BLOCK, to % BLOCK);
-        let own = &mut self.states[block];
-        [own.position[k], own.velocity[k], own.angle[k], own.spin[k]] = other.state(from);
-        self.steps[to] = other.steps[from];
-        if let (Some(own), Some(other)) = (&mut self.delay, &other.delay) {
-            (own.past[to], own.steps[to], own.rest[to]) = (other.past[from], other.steps[from], other.rest[from]);
+    /// Makes lane `to` a copy of lane `from` of `other`, or of its own where there is none.
+    pub fn copy(&mut self, other: Option<&Self>, from: usize, to: usize) {
+        let source = other.unwrap_or(self);
+        let state = [source.position[from], source.velocity[from], source.angle[from], source.spin[from]];
+        self.steps[to] = source.steps[from];
+        [self.position[to], self.velocity[to], self.angle[to], self.spin[to]] = state;
+        self.constants.copy(other.map(|other| &other.constants), from, to);
+        if let Some(own) = &mut self.delay {
+            own.copy(other.and_then(|other| other.delay.as_ref()), from, to);
         }
-        if let (Some(own), Some(other)) = (&mut self.noise, &other.noise) {
-            (own.std[to], own.draws[to]) = (other.std[from], other.draws[from]);
+        if let Some(own) = &mut self.noise {
+            own.copy(other.and_then(|other| other.noise.as_ref()), from, to);
         }
-        if self.constants.len() > 1 || self.states.len() == 1 {
-            let from_block = if other.constants.len() == 1 { 0 } else { from / BLOCK };
-            self.constants[block].copy_lane(&other.constants[from_block], from % BLOCK, k);
+    }
+
+    /// A step of the `N` lanes from lane `first` on: as many at any time, so that compilers know how far their loops go.
+    #[inline(always)]
+    fn step_tile<const N: usize>(&mut self, first: usize, actions: &[i64; N], out: &mut Out<'_>) {
+        let own = first..first + N;
+        let steps = &mut self.steps[own.clone()];
+        let mut commands = [0.0; N];
+        match &mut self.delay {
+            None => plain(actions, &mut commands),
+            Some(delay) => delay.pass(first, actions, steps, &mut commands),
+        }
+        steps.iter_mut().for_each(|steps| *steps = steps.saturating_add(1));
+        late(steps, self.max_steps, &mut out.truncated[own.clone()]);
+        let (position, velocity) = (&mut self.position[own.clone()], &mut self.velocity[own.clone()]);
+        let (angle, spin) = (&mut self.angle[own.clone()], &mut self.spin[own.clone()]);
+        advance(position, velocity, angle, spin, &commands, &self.constants, first, self.step);
+        over(position, angle, self.thresholds, &mut out.terminated[own.clone()]);
+        let (rows, _) = out.observations[4 * first..4 * own.end].as_chunks_mut();
+        match &mut self.noise {
+            None => write(position, velocity, angle, spin, rows),
+            Some(noise) => {
+                let mut seen = [0.0; N];
+                noise.add(first, position, &mut seen);
+                write(&seen, velocity, angle, spin, rows);
+            }
         }
     }
 }
@@ -246,8 +165,7 @@ impl CartPoleLanes {
 struct Stepped<'a> {
     lanes: &'a mut CartPoleLanes,
     actions: &'a [i64],
-    observations: &'a mut [f32],
-    terminated: &'a mut [bool],
+    out: Out<'a>,
 }
 
 impl NullaryFnOnce for Stepped<'_> {
@@ -256,160 +174,143 @@ impl NullaryFnOnce for Stepped<'_> {
     // What is not inlined here is compiled without the processor's vectors.
     #[inline(always)]
     fn call(self) {
-        let CartPoleLanes { states, constants, delay, noise, steps, step, thresholds, .. } = self.lanes;
-        let one = constants.len() == 1;
-        let rows = self.observations.chunks_mut(4 * BLOCK).zip(self.terminated.chunks_mut(BLOCK));
-        let lanes = states.iter_mut().zip(steps.chunks_exact_mut(BLOCK)).zip(self.actions.chunks(BLOCK)).zip(rows);
-        for (block, (((state, steps), given), (observations, terminated))) in lanes.enumerate() {
-            let own = if one { &constants[0] } else { &constants[block] };
-            let mut actions = [0; BLOCK];
-            actions[..given.len()].copy_from_slice(given);
-            let mut command = match delay {
-                None => plain(&actions),
-                Some(delay) => delay.pass(block, &actions, steps),
-            };
-            for k in 0..BLOCK {
-                command[k] *= own.gain[k];
-                steps[k] = steps[k].saturating_add(1);
+        let Self { lanes, actions, mut out } = self;
+        let (tiles, left) = actions.as_chunks::<TILE>();
+        let (small, single) = left.as_chunks::<SMALL_TILE>();
+        let mut first = 0;
+        for actions in tiles {
+            lanes.step_tile(first, actions, &mut out);
+            first += TILE;
+        }
+        for actions in small {
+            lanes.step_tile(first, actions, &mut out);
+            first += SMALL_TILE;
+        }
+        for action in single {
+            lanes.step_tile(first, &[*action], &mut out);
+            first += 1;
+        }
+    }
+}
+
+#[inline(always)]
+fn late(steps: &[u32], max: u32, truncated: &mut [bool]) {
+    truncated.iter_mut().zip(steps).for_each(|(truncated, steps)| *truncated = *steps >= max);
+}
+
+#[inline(always)]
+fn over(position: &[f64], angle: &[f64], thresholds: Thresholds, terminated: &mut [bool]) {
+    let count = terminated.len();
+    let (position, angle) = (&position[..count], &angle[..count]);
+    for k in 0..count {
+        terminated[k] = (position[k].abs() > thresholds.position) | (angle[k].abs() > thresholds.angle);
+    }
+}
+
+#[inline(always)]
+fn write(seen: &[f64], velocity: &[f64], angle: &[f64], spin: &[f64], rows: &mut [[f32; 4]]) {
+    let count = rows.len();
+    let (seen, velocity, angle, spin) = (&seen[..count], &velocity[..count], &angle[..count], &spin[..count]);
+    for k in 0..count {
+        rows[k] = [seen[k] as f32, velocity[k] as f32, angle[k] as f32, spin[k] as f32];
+    }
+}
+
+/// Episodes that begin, with what is read and written.
+struct Begun<'a> {
+    own: &'a mut CartPoleLanes,
+    lanes: &'a [u32],
+    episodes: &'a [Episode],
+    start: Start,
+    observations: &'a mut [f32],
+}
+
+impl NullaryFnOnce for Begun<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { own, lanes, episodes, start, observations } = self;
+        let (rows, _) = observations.as_chunks_mut::<4>();
+        for (lanes, some) in lanes.chunks(AT_ONCE).zip(episodes.chunks(AT_ONCE)) {
+            // All places are drawn for, so that this is a loop without a branch; those that are no lane's are left.
+            let mut episodes = [Episode::default(); AT_ONCE];
+            episodes[..some.len()].copy_from_slice(some);
+            let (mut states, mut seeds) = ([[0.0; AT_ONCE]; 4], [Seed(0); AT_ONCE]);
+            for k in 0..AT_ONCE {
+                let state = started(episodes[k], start);
+                for (row, value) in states.iter_mut().zip(state) {
+                    row[k] = value;
+                }
+                seeds[k] = episodes[k].seed();
             }
-            advance(state, own, &command, *step);
-            let mut seen = state.position;
-            if let Some(noise) = noise {
-                noise.add(block, &mut seen[..given.len()]);
+            let [position, velocity, angle, spin] = states;
+            let mut seen = position;
+            if let Some(noise) = &mut own.noise {
+                noise.begin(lanes, &seeds, &mut seen);
             }
-            write(state, &seen, thresholds, observations, terminated);
+            for (k, lane) in lanes.iter().enumerate() {
+                let lane = *lane as usize;
+                own.position[lane] = position[k];
+                own.velocity[lane] = velocity[k];
+                own.angle[lane] = angle[k];
+                own.spin[lane] = spin[k];
+                own.steps[lane] = 0;
+                rows[lane] = [seen[k], velocity[k], angle[k], spin[k]].map(|value| value as f32);
+            }
         }
-    }
-}
-
-impl Constants {
-    fn copy_lane(&mut self, other: &Self, from: usize, to: usize) {
-        let rows = [
-            (&mut self.mass, &other.mass),
-            (&mut self.swinging, &other.swinging),
-            (&mut self.lever, &other.lever),
-            (&mut self.weight, &other.weight),
-            (&mut self.hinge, &other.hinge),
-            (&mut self.friction, &other.friction),
-            (&mut self.turning, &other.turning),
-            (&mut self.lightness, &other.lightness),
-            (&mut self.gain, &other.gain),
-        ];
-        rows.into_iter().for_each(|(own, other)| own[to] = other[from]);
-    }
-}
-
-/// Angles up to this size [rad] have a short way to their sine: all that a pole under way has.
-const SHORT: f64 = 0.5;
-
-/// Sine and cosine of each angle [rad]. A lane's bits do not depend on its neighbours' angles.
-#[inline(always)]
-fn sines(angle: &Row) -> (Row, Row) {
-    let (mut sin, mut cos) = ([0.0; BLOCK], [0.0; BLOCK]);
-    let mut short = true;
-    for k in 0..BLOCK {
-        let q = angle[k];
-        let z = q * q;
-        let z2 = z * z;
-        let z4 = z2 * z2;
-        // Taylor's series; what is left out is below 1e-17 of 1 within the short way.
-        let low = (1.0 - z * (1.0 / 6.0)) + z2 * (1.0 / 120.0 - z * (1.0 / 5_040.0));
-        let high = (1.0 / 362_880.0 - z * (1.0 / 39_916_800.0)) + z2 * (1.0 / 6_227_020_800.0);
-        sin[k] = q * (low + z4 * high);
-        let low = (1.0 - z * 0.5) + z2 * (1.0 / 24.0 - z * (1.0 / 720.0));
-        let high = (1.0 / 40_320.0 - z * (1.0 / 3_628_800.0)) + z2 * (1.0 / 479_001_600.0 - z * (1.0 / 87_178_291_200.0));
-        cos[k] = low + z4 * high;
-        short &= q.abs() <= SHORT;
-    }
-    if !short {
-        long(angle, &mut sin, &mut cos);
-    }
-    (sin, cos)
-}
-
-#[cold]
-#[inline(never)]
-fn long(angle: &Row, sin: &mut Row, cos: &mut Row) {
-    for k in 0..BLOCK {
-        if angle[k].abs() > SHORT || angle[k].is_nan() {
-            sin[k] = sine(angle[k]);
-            cos[k] = sine(angle[k] + std::f64::consts::FRAC_PI_2);
-        }
-    }
-}
-
-/// Speeds are cut off here [m/s, rad/s]: none under way is near it, and one whose episode is over stays finite.
-const FASTEST: f64 = 1e4;
-
-/// One step of Euler's method of all lanes of a block.
-#[inline(always)]
-#[expect(clippy::manual_clamp, reason = "a clamp keeps what is no number, and is no single instruction")]
-fn advance(state: &mut State, own: &Constants, force: &Row, step: f64) {
-    let (sin, cos) = sines(&state.angle);
-    for k in 0..BLOCK {
-        let (velocity, spin) = (state.velocity[k], state.spin[k]);
-        let leaning = own.weight[k] * sin[k] - own.hinge[k] * spin;
-        let reaction = own.lever[k] * spin * spin * sin[k] - 0.75 * cos[k] * leaning;
-        let inertia = own.mass[k] - own.swinging[k] * cos[k] * cos[k];
-        let acceleration = (force[k] - own.friction[k] * velocity + reaction) / inertia;
-        let turning = own.turning[k] * (leaning * own.lightness[k] - cos[k] * acceleration);
-        state.position[k] += step * velocity;
-        state.angle[k] += step * spin;
-        state.velocity[k] = (velocity + step * acceleration).max(-FASTEST).min(FASTEST);
-        state.spin[k] = (spin + step * turning).max(-FASTEST).min(FASTEST);
-    }
-}
-
-#[inline(always)]
-fn write(state: &State, seen: &Row, thresholds: &Thresholds, observations: &mut [f32], terminated: &mut [bool]) {
-    let mut over = [false; BLOCK];
-    for k in 0..BLOCK {
-        over[k] = (state.position[k].abs() > thresholds.position) | (state.angle[k].abs() > thresholds.angle);
-    }
-    if let (Some(rows), Some(all)) = (observations.first_chunk_mut::<{ 4 * BLOCK }>(), terminated.first_chunk_mut()) {
-        *all = over;
-        for k in 0..BLOCK {
-            rows[4 * k] = seen[k] as f32;
-            rows[4 * k + 1] = state.velocity[k] as f32;
-            rows[4 * k + 2] = state.angle[k] as f32;
-            rows[4 * k + 3] = state.spin[k] as f32;
-        }
-        return;
-    }
-    for (k, (row, terminated)) in observations.chunks_exact_mut(4).zip(terminated).enumerate() {
-        *terminated = over[k];
-        row.copy_from_slice(&[seen[k], state.velocity[k], state.angle[k], state.spin[k]].map(|value| value as f32));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rl::Buffers;
 
+    /// In tiles, in small ones, and by itself: 64, 8 and 1 lanes at a time.
     #[test]
-    fn short_and_long_ways_are_sines() {
-        for block in 0..4_000 {
-            let angle: Row =
-                std::array::from_fn(|k| (block * BLOCK + k) as f64 * 5e-5 * if k % 2 == 0 { 1.0 } else { -1.0 });
-            let (sin, cos) = sines(&angle);
-            for k in 0..BLOCK {
-                assert!((sin[k] - angle[k].sin()).abs() < 5e-16 && (cos[k] - angle[k].cos()).abs() < 5e-16, "{}", angle[k]);
+    fn a_lane_has_the_same_bits_however_many_are_stepped_with_it() {
+        let values = [1.0, 0.1, 0.5, 9.8, 0.1, 0.01, 10.0, 0.03, 0.01];
+        let wires = Wires { delay: Some(7), noise: Some(8) };
+        let thresholds = Thresholds { position: 2.4, angle: 0.2 };
+        let start = Start { low: -0.3, high: 0.3 };
+        let run = |seeds: &[u64]| {
+            let count = seeds.len();
+            let mut lanes = CartPoleLanes::new(count, &values, |k| k == 3, wires, (0.02, 500), thresholds);
+            let mut buffers = Buffers::new(count, 4);
+            let all: Vec<u32> = (0..count as u32).collect();
+            let episodes: Vec<Episode> = seeds.iter().map(|seed| Episode { seed: *seed, number: 2 }).collect();
+            let tuned =
+                |seed: u64| [1.0, 0.1, 0.5, 9.0 + seed as f64 * 0.01, 0.1, 0.01, 10.0, 0.01 * (seed % 9) as f64, 0.01];
+            seeds.iter().enumerate().for_each(|(lane, seed)| lanes.retune(lane, &tuned(*seed)));
+            lanes.begin(&all, &episodes, start, &mut buffers.observations);
+            let mut seen: Vec<Vec<[u32; 4]>> = vec![Vec::new(); count];
+            for step in 0..60 {
+                let actions: Vec<i64> = seeds.iter().map(|seed| ((seed + step) / 3 % 2) as i64).collect();
+                for (seen, row) in seen.iter_mut().zip(buffers.observations.as_chunks::<4>().0) {
+                    seen.push(row.map(f32::to_bits));
+                }
+                lanes.step(&actions, &mut buffers.out());
             }
+            seen
+        };
+        let seeds: Vec<u64> = (0..85).collect();
+        let together = run(&seeds);
+        for (seed, together) in seeds.iter().zip(together) {
+            assert_eq!(run(&[*seed])[0], together, "seed {seed}");
         }
-        // What is beside an angle changes no bit of its sine.
-        let alone = sines(&[0.1; BLOCK]).0[0];
-        assert_eq!(sines(&[0.1, 3.0, -2.0, 0.1, 0.1, 0.1, 0.1, 0.1]).0[0].to_bits(), alone.to_bits());
     }
 
     #[test]
     fn what_is_over_stays_finite() {
         let values = [1.0, 0.1, 0.5, 9.8, 0.0, 0.0, 10.0];
         let thresholds = Thresholds { position: 2.4, angle: 0.2 };
-        let mut lanes = CartPoleLanes::new(3, &values, false, Wires::default(), 0.02, thresholds);
-        let (mut observations, mut terminated) = (vec![0.0; 12], vec![false; 3]);
+        let mut lanes = CartPoleLanes::new(3, &values, |_| false, Wires::default(), (0.02, 500), thresholds);
+        let mut buffers = Buffers::new(3, 4);
         for k in 0..20_000 {
-            lanes.step(&[1, 0, i64::from(k % 2 == 0)], &mut observations, &mut terminated);
+            lanes.step(&[1, 0, i64::from(k % 2 == 0)], &mut buffers.out());
         }
-        assert!(observations.iter().all(|v| v.is_finite()) && terminated[..2] == [true; 2]);
+        assert!(buffers.observations.iter().all(|v| v.is_finite()));
+        assert!(buffers.terminated[..2] == [true; 2] && buffers.truncated == [true; 3]);
     }
 }

@@ -36,6 +36,8 @@ pub(super) struct LaneParameters {
     startup: bool,
     randomization: Option<Randomization>,
     scratch: Option<DrawTable>,
+    /// Draws of several lanes that begin together.
+    several: Option<Several>,
     groups: Vec<Group>,
     /// Values drawn, shape (lanes, rows): a lane that begins writes them next to each other.
     values: Vec<f64>,
@@ -45,6 +47,16 @@ pub(super) struct LaneParameters {
     /// All parameters of the lane that was last asked for.
     whole: Vec<f64>,
 }
+
+/// Lanes whose draws are made together, at most [`TOGETHER`].
+#[derive(Debug, Clone)]
+struct Several {
+    table: DrawTable,
+    keys: Vec<DrawKey>,
+    numbers: Vec<u64>,
+}
+
+const TOGETHER: usize = 64;
 
 /// Which regime each lane is in: from each to any other, or to none, at a constant rate.
 #[derive(Debug, Clone, Default)]
@@ -64,6 +76,12 @@ impl LaneParameters {
     pub(super) fn new(parameters: &[Parameter], randomization: Option<Randomization>, lanes: usize) -> Self {
         let nominal: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
         let scratch = randomization.as_ref().map(|r| r.randomizer.nominal(1));
+        let made = |r: &Randomization| Several {
+            table: r.randomizer.nominal(TOGETHER.min(lanes)),
+            keys: Vec::with_capacity(TOGETHER),
+            numbers: Vec::with_capacity(TOGETHER),
+        };
+        let several = randomization.as_ref().map(made);
         let group = |own: Within| Group { scratch: own.randomizer.nominal(1), own, drawn: vec![0; lanes] };
         let groups: Vec<Group> = randomization.iter().flat_map(|r| r.randomizer.within()).map(group).collect();
         let rows = randomization.as_ref().map_or(0, |r| r.places.len());
@@ -86,6 +104,7 @@ impl LaneParameters {
             startup,
             randomization,
             scratch,
+            several,
             groups,
             values: vec![0.0; rows * lanes],
             keys: vec![None; lanes],
@@ -129,11 +148,7 @@ impl LaneParameters {
     /// Draws for lane `lane`, which begins `episode`, and gives all its parameters. `level` is a part of the declared one.
     pub(super) fn begin(&mut self, lane: usize, episode: Episode, level: f64) -> &[f64] {
         let (Some(own), Some(scratch)) = (&self.randomization, &mut self.scratch) else { return &self.nominal };
-        let key = match self.keys[lane] {
-            Some((seed, key)) if seed == episode.seed => key,
-            _ => DrawKey::new(Seed(episode.seed)),
-        };
-        self.keys[lane] = Some((episode.seed, key));
+        let key = key_of(&mut self.keys[lane], episode.seed);
         let level = Level::new(own.level.get() * level).unwrap_or(own.level);
         self.levels[lane] = level;
         let turn = Turn { environment: 0, episode: episode.number };
@@ -153,8 +168,37 @@ impl LaneParameters {
         self.whole(lane)
     }
 
+    /// Draws for `lanes`, which begin these episodes, as many, as [`begin`](Self::begin) does for one; for what draws nothing within
+    /// episodes.
+    pub(super) fn begin_all(&mut self, lanes: &[u32], episodes: &[Episode], level: f64) {
+        let (Some(own), Some(several)) = (&self.randomization, &mut self.several) else { return };
+        let level = Level::new(own.level.get() * level).unwrap_or(own.level);
+        for (lanes, episodes) in lanes.chunks(TOGETHER).zip(episodes.chunks(TOGETHER)) {
+            let Several { table, keys, numbers } = &mut *several;
+            keys.clear();
+            for (lane, episode) in lanes.iter().zip(episodes) {
+                keys.push(key_of(&mut self.keys[*lane as usize], episode.seed));
+                self.levels[*lane as usize] = level;
+            }
+            if self.startup {
+                numbers.clear();
+                numbers.resize(keys.len(), 0);
+                own.randomizer.redraw_each(table, keys, Occasion::Startup, numbers, level);
+            }
+            numbers.clear();
+            numbers.extend(episodes.iter().map(|episode| episode.number));
+            own.randomizer.redraw_each(table, keys, Occasion::Reset, numbers, level);
+            for row in 0..self.rows {
+                for (lane, value) in lanes.iter().zip(table.row(row)) {
+                    self.values[*lane as usize * self.rows + row] = *value;
+                }
+            }
+        }
+    }
+
     /// All parameters of lane `lane` as they are.
-    fn whole(&mut self, lane: usize) -> &[f64] {
+    #[inline]
+    pub(super) fn whole(&mut self, lane: usize) -> &[f64] {
         if let Some(own) = &self.randomization {
             for (row, place) in own.places.iter().enumerate() {
                 self.whole[*place] = self.values[lane * self.rows + row];
@@ -217,6 +261,19 @@ impl LaneParameters {
     pub(super) fn same_as(&self, other: &Self) -> bool {
         let of = |this: &Self| this.randomization.as_ref().map(|r| r.randomizer.clone());
         self.nominal == other.nominal && of(self) == of(other)
+    }
+}
+
+/// The key of the draws of `seed`, kept from the last time it was asked for.
+#[inline]
+fn key_of(kept: &mut Option<(u64, DrawKey)>, seed: u64) -> DrawKey {
+    match *kept {
+        Some((last, key)) if last == seed => key,
+        _ => {
+            let key = DrawKey::new(Seed(seed));
+            *kept = Some((seed, key));
+            key
+        }
     }
 }
 
@@ -283,6 +340,30 @@ mod tests {
         assert!(first[2] != second[2] && first[3] != second[3]);
         assert_eq!(parameters.begin(0, Episode { seed: 3, number: 0 }, 1.0), first);
         assert_eq!(parameters.begin(0, Episode { seed: 3, number: 0 }, 0.0), [5.0; 5]);
+    }
+
+    #[test]
+    fn lanes_that_begin_together_draw_what_each_draws_alone() {
+        let parameters = ["a", "b", "c"].map(|name| Parameter::new(name, "", 5.0));
+        let normal =
+            Randomized { distribution: Distribution::Normal { mean: 1.0, std: 0.5 }, ..uniform("c", Redraw::Reset) };
+        let randomizer = Randomizer::new(vec![uniform("b", Redraw::Startup), normal], Vec::new()).unwrap();
+        let randomization = Randomization { randomizer, places: vec![1, 2], level: Level::FULL, regime_seconds: 1.0 };
+        let new = |lanes| LaneParameters::new(&parameters, Some(randomization.clone()), lanes);
+        let (mut together, mut alone) = (new(200), new(200));
+        let due: Vec<u32> = (0..200).filter(|lane| lane % 7 != 3).collect();
+        for number in [0, 1, 7] {
+            for level in [1.0, 0.3] {
+                let episode = |lane: &u32| Episode { seed: u64::from(*lane % 90) * 3, number: number + u64::from(*lane) };
+                let episodes: Vec<Episode> = due.iter().map(episode).collect();
+                together.begin_all(&due, &episodes, level);
+                for (lane, episode) in due.iter().zip(&episodes) {
+                    let lane = *lane as usize;
+                    assert_eq!(together.whole(lane), alone.begin(lane, *episode, level), "lane {lane}");
+                }
+            }
+        }
+        assert_eq!(together.whole(3)[1..], [0.0; 2]);
     }
 
     #[test]

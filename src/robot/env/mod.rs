@@ -5,6 +5,7 @@
 
 mod cart_pole;
 mod cart_pole_lanes;
+mod cart_pole_motion;
 mod cart_pole_wires;
 mod draws;
 mod pendulum;

@@ -29,6 +29,10 @@ impl<P: Mover> Mechanism<P> for PayloadChange {
         }
     }
 
+    fn ages(&self) -> bool {
+        true
+    }
+
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let spacing = (typical.duration / TIMES).max(1.0);
         let count = ((typical.duration / spacing).ceil() as usize).clamp(2, TIMES as usize);

@@ -8,7 +8,7 @@ use crate::sim2real::identify::{Block, State};
 use crate::sim2real::{Candidate, Twin};
 
 /// Points followed side by side: more gain no speed and cost memory.
-const LANES: usize = 48;
+const LANES: usize = 16;
 /// Signatures shorter than this, in units of the noise and over all rows, are not excited: the recordings would look the
 /// same with and without the mechanism.
 const EXCITED: f64 = 3.0;
@@ -154,7 +154,7 @@ fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usi
     let mut starts: Vec<(f64, Vec<f64>)> = Vec::new();
     for ground in grounds {
         let mut tried: Vec<Tried> = Vec::new();
-        for batch in trials.chunks((LANES / trials[0].len().max(1)).max(1)) {
+        for batch in trials.chunks(batch(trials.len(), trials[0].len())) {
             let thetas: Vec<Vec<f64>> =
                 batch.iter().flatten().map(|point| ground.values.iter().chain(point).copied().collect()).collect();
             let mut followed = problem.residuals(&thetas, &ground.state, &ground.basis).into_iter();
@@ -182,6 +182,12 @@ fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usi
     starts.sort_by(|a, b| b.0.total_cmp(&a.0));
     let starts = starts.into_iter().map(|(_, start)| start).collect();
     best.map(|best| Screened { score: best.score.max(0.0), excited: loudest > EXCITED, starts, ..best })
+}
+
+/// How many of so many trials of so many points each are followed side by side: as many each time.
+fn batch(trials: usize, points: usize) -> usize {
+    let most = (LANES / points.max(1)).max(1);
+    trials.div_ceil(trials.div_ceil(most).max(1)).max(1)
 }
 
 /// The points to follow: each entry holds one point, or, for a law with parameters it is proportional to, one point for

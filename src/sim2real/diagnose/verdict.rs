@@ -268,17 +268,13 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
             false => Verdict::NoMismatch,
         };
     }
-    // What fits the past to the noise and not the future was never excited enough to be told; what fits neither is wrong.
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
         let visible = findings.fits.iter().any(above_the_noise);
         return match findings.sampled {
-            true if !clean => Verdict::Unexplained,
-            // What held-out data hardly reach, they do not speak against.
-            true if library(effects) >= CERTAIN && !findings.fits.iter().any(worse) => Verdict::Ambiguous,
-            true if library(effects) < LIKELIER_THAN_NOT && visible => Verdict::Unexplained,
+            true => unconfirmed(library(effects), clean, visible),
             false if findings.refuted => Verdict::Unexplained,
-            _ => Verdict::NotExcited,
+            false => Verdict::NotExcited,
         };
     }
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
@@ -288,6 +284,21 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
         return Verdict::Unexplained;
     }
     if unseen || effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
+}
+
+/// What is said of names that held-out signals do not confirm: `known` is how likely it is that they are the library's, `clean` whether
+/// the fitted data are explained, and `visible` whether the recalibrated twin is off on the held-out ones.
+///
+/// Held-out data that part at a bounce or slip a pole speak neither for nor against what the fitted ones leave no doubt of. Where
+/// these leave doubts and the twin is off all the same, or where no name is believed, something else is missing. The rest was never
+/// moved enough to be told.
+fn unconfirmed(known: f64, clean: bool, visible: bool) -> Verdict {
+    match known {
+        _ if !clean => Verdict::Unexplained,
+        _ if known >= CERTAIN => Verdict::Ambiguous,
+        _ if visible || known < HARDLY_THE_LIBRARY => Verdict::Unexplained,
+        _ => Verdict::NotExcited,
+    }
 }
 
 fn parameters<T: Twin>(
@@ -388,6 +399,19 @@ mod tests {
         assert!(!says(&[effect(0.4, &[])], false) && says(&[effect(0.4, &[0.2])], false), "its rivals count");
         assert!(says(&[effect(0.4, &[]), effect(0.9, &[])], false), "of several, one may be right");
         assert!(!says(&[effect(0.6, &[])], true) && says(&[effect(0.8, &[])], true), "what fails unseen must be certain");
+    }
+
+    #[test]
+    fn what_held_out_data_do_not_confirm_is_as_sure_as_the_fitted_ones_make_it() {
+        assert_eq!(
+            unconfirmed(0.74, true, true),
+            Verdict::Ambiguous,
+            "an end stop, and a held-out run that parts at a bounce"
+        );
+        assert_eq!(unconfirmed(0.57, true, true), Verdict::Unexplained, "a shaking that a compliance hardly is");
+        assert_eq!(unconfirmed(0.0, true, false), Verdict::Unexplained, "nobody believes it");
+        assert_eq!(unconfirmed(0.3, true, false), Verdict::NotExcited, "nothing is off where it was not fitted");
+        assert_eq!(unconfirmed(0.9, false, true), Verdict::Unexplained, "what fits neither past nor future");
     }
 
     #[test]

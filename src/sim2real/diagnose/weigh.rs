@@ -1,5 +1,7 @@
 //! Weighing: what the evidence says of one hypothesis beside another.
 
+use std::cmp::Ordering;
+
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
@@ -32,8 +34,9 @@ const HOPELESS: f64 = 300.0;
 const TOLERATED: f64 = 0.03;
 /// ... where that is no more than this part of what they explain.
 const NEXT_TO_NOTHING: f64 = 0.01;
-/// The evidence between two that say the same in as many constants is no more than this.
-const INDIFFERENT: f64 = 1.0;
+/// The evidence between two that say the same in as many constants is no more than this: of 45 names of five spent test seeds that were
+/// told apart by no more, 37 were right, and twice the logarithm of such odds is 3.
+const INDIFFERENT: f64 = 3.0;
 /// Degrees of freedom of what a twin says of its parameters' uncertainty.
 const FREEDOM: f64 = 4.0;
 /// Numbers of effective residuals whose ratio is smaller than this differ by their own scatter.
@@ -98,10 +101,20 @@ pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: 
     // What says the same is told apart by its length alone.
     let said = match b.free() as f64 - a.free() as f64 {
         _ if !alike(inquiry, first, a, b) => evidence,
-        0.0 => evidence.clamp(-INDIFFERENT, INDIFFERENT),
+        0.0 => match ageing(inquiry, a).cmp(&ageing(inquiry, b)) {
+            // What is the same at all times explains more than what happens to change as if it were.
+            Ordering::Greater => -INDIFFERENT,
+            Ordering::Less => INDIFFERENT,
+            Ordering::Equal => evidence.clamp(-INDIFFERENT, INDIFFERENT),
+        },
         longer => longer * (1.0 + least_left(a, b).misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln(),
     };
     said + by_own
+}
+
+/// How many of the laws of `hypothesis` are others at other times.
+fn ageing<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> usize {
+    hypothesis.added.iter().filter(|number| inquiry.candidates[**number].ages).count()
 }
 
 /// The same by what they leave alone, also where that is alike.

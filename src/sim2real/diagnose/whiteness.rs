@@ -1,5 +1,9 @@
 //! How much independent evidence residuals hold, and whether anything is left in them.
 
+use std::cell::RefCell;
+
+use realfft::RealFftPlanner;
+
 use crate::sim2real::identify::Block;
 
 /// Lags over which [`adequacy`] looks.
@@ -144,6 +148,11 @@ pub(super) fn adequacy(residual: &[f64], blocks: &[Block]) -> f64 {
     channels.into_iter().filter_map(of).fold(0.0, f64::max)
 }
 
+thread_local! {
+    /// Transforms are planned once for each length: that takes longer than to make one.
+    static PLANS: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
+
 /// Sums of lagged products over all parts, none across a boundary, by fast Fourier transform.
 fn autocovariances(series: &[&[f64]], lags: usize) -> Option<Vec<f64>> {
     let longest = series.iter().map(|s| s.len()).max()?;
@@ -151,8 +160,7 @@ fn autocovariances(series: &[&[f64]], lags: usize) -> Option<Vec<f64>> {
     let mut total = vec![0.0; lags];
     for part in series.iter().filter(|s| !s.is_empty()) {
         let size = (2 * part.len()).next_power_of_two();
-        let mut planner = realfft::RealFftPlanner::<f64>::new();
-        let (forward, inverse) = (planner.plan_fft_forward(size), planner.plan_fft_inverse(size));
+        let (forward, inverse) = PLANS.with_borrow_mut(|plans| (plans.plan_fft_forward(size), plans.plan_fft_inverse(size)));
         let mut padded = forward.make_input_vec();
         padded[..part.len()].copy_from_slice(part);
         let mut spectrum = forward.make_output_vec();

@@ -232,7 +232,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         while self.damping < STUCK {
             let points: Vec<(Vec<f64>, State)> =
                 SPREAD.iter().map(|s| self.moved(&information, &gradient, &held, s * self.damping)).collect();
-            let values = self.problem.objectives(&points);
+            let (values, residuals) = self.problem.tried(&points);
             let best = values
                 .iter()
                 .zip(&points)
@@ -246,7 +246,9 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
                 let matters = self.fell > 0.1 * CONVERGED;
                 (self.theta, self.state) = (theta, state);
                 self.damping = (self.damping * SPREAD[k]).max(1e-9);
-                let runs = self.problem.followed(&self.theta, &self.state, self.free);
+                // What is left there has been followed already.
+                let known = residuals.into_iter().map(|part| part.into_iter().nth(k)).collect();
+                let runs = self.problem.followed_beside(known, &self.theta, &self.state, self.free);
                 self.evaluation = self.problem.projected(&runs, &self.state);
                 self.temper(&runs);
                 self.ended |= !matters;
@@ -261,7 +263,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
     /// `J'J` and `J'r`, priors of the parameters included.
     fn normal_equations(&self) -> (DMatrix<f64>, DVector<f64>) {
         let jacobian = &self.evaluation.jacobian;
-        let mut information = jacobian.tr_mul(jacobian);
+        let mut information = gram(jacobian);
         let mut gradient = jacobian.tr_mul(&self.evaluation.residual);
         for (i, k) in self.free.iter().enumerate() {
             let weight = (self.state.misfit * prior_weight(self.problem, *k)).powi(2);
@@ -313,7 +315,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let scales: Vec<f64> = free.iter().map(|k| parameters[*k].scale()).collect();
         let mut scaled = evaluation.jacobian.clone();
         scaled.column_iter_mut().zip(&scales).for_each(|(mut column, scale)| column *= *scale);
-        let mut information = scaled.tr_mul(&scaled);
+        let mut information = gram(&scaled);
         let rank = rank(&information);
         for (i, k) in free.iter().enumerate() {
             information[(i, i)] += (state.misfit * prior_weight(problem, *k) * scales[i]).powi(2);
@@ -341,6 +343,19 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             at_bound,
         }
     }
+}
+
+/// Products of all columns with each other; each pair is multiplied once.
+fn gram(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let count = columns.ncols();
+    let mut products = DMatrix::zeros(count, count);
+    for i in 0..count {
+        for j in 0..=i {
+            let product = columns.column(i).dot(&columns.column(j));
+            (products[(i, j)], products[(j, i)]) = (product, product);
+        }
+    }
+    products
 }
 
 /// `-(H + damping diag H)^-1 g` over the parameters that are not held, in units in which the diagonal of `H` is 1.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::sim2real::residual::residuals_into;
+use crate::sim2real::residual::residuals;
 use crate::sim2real::{ChannelWeight, Parameter, Part, Seed, Simulator, Thetas};
 
 /// Step of a finite difference, as a part of a parameter's scale: wide enough to smooth over the moments at which dry
@@ -120,8 +120,21 @@ impl<S: Simulator> Problem<'_, S> {
 
     /// Follows all parts, and their derivatives by the parameters numbered in `free` and by initial states.
     pub(super) fn followed(&self, theta: &[f64], state: &State, free: &[usize]) -> Runs {
-        let parts = self.parts.par_iter().zip(&state.initial).zip(&state.values);
-        Runs(parts.map(|((part, initial), start)| self.follow(part, theta, initial, start, free)).collect())
+        self.followed_beside(vec![None; self.parts.len()], theta, state, free)
+    }
+
+    /// The same where residuals at `theta` and `state` may be known already, part by part.
+    pub(super) fn followed_beside(
+        &self,
+        known: Vec<Option<DVector<f64>>>,
+        theta: &[f64],
+        state: &State,
+        free: &[usize],
+    ) -> Runs {
+        let parts = self.parts.par_iter().zip(&state.initial).zip(&state.values).zip(known);
+        Runs(
+            parts.map(|(((part, initial), start), known)| self.follow(part, (theta, start), initial, free, known)).collect(),
+        )
     }
 
     /// What is left of `runs` once the initial states of `state`, from which they were followed, are moved to where they fit
@@ -129,35 +142,38 @@ impl<S: Simulator> Problem<'_, S> {
     pub(super) fn projected(&self, runs: &Runs, state: &State) -> Evaluation {
         let parts = runs.0.par_iter().zip(&state.initial).zip(&state.values);
         let pieces: Vec<Piece> = parts.map(|((run, initial), start)| project(run, initial, start, state.misfit)).collect();
-        self.assemble(&pieces)
+        Self::assemble(pieces)
     }
 
     /// Lays the pieces one after the other: all measured residuals first, then all prior rows.
-    fn assemble(&self, pieces: &[Piece]) -> Evaluation {
-        let columns = pieces.first().map_or(0, |p| p.jacobian.ncols());
+    fn assemble(pieces: Vec<Piece>) -> Evaluation {
+        let objective = pieces.iter().map(|p| p.objective).sum();
         let measured: Vec<usize> = pieces.iter().map(|p| p.residual.len() - p.initial_step.len()).collect();
-        let total: usize = pieces.iter().map(|p| p.residual.len()).sum();
-        let mut residual = DVector::zeros(total);
-        let mut jacobian = DMatrix::zeros(total, columns);
-        let (mut at, mut prior_at) = (0, measured.iter().sum());
-        for (piece, count) in pieces.iter().zip(measured) {
-            let priors = piece.initial_step.len();
-            for (from, to, rows) in [(0, at, count), (count, prior_at, priors)] {
-                residual.rows_mut(to, rows).copy_from(&piece.residual.rows(from, rows));
-                jacobian.rows_mut(to, rows).copy_from(&piece.jacobian.rows(from, rows));
-            }
-            at += count;
-            prior_at += priors;
-        }
-        Evaluation {
+        let (residual, jacobian) = match pieces.as_slice() {
+            [_] => (DVector::zeros(0), DMatrix::zeros(0, 0)),
+            pieces => stacked(pieces, &measured),
+        };
+        let alone = pieces.len() == 1;
+        let count = pieces.len();
+        let mut whole = Evaluation {
             residual,
             jacobian,
-            measured: at,
-            initial_step: pieces.iter().map(|p| p.initial_step.clone()).collect(),
-            initial_by_parameter: pieces.iter().map(|p| p.initial_by_parameter.clone()).collect(),
-            initial_basis: pieces.iter().map(|p| p.initial_basis.clone()).collect(),
-            objective: pieces.iter().map(|p| p.objective).sum(),
+            measured: measured.iter().sum(),
+            initial_step: Vec::with_capacity(count),
+            initial_by_parameter: Vec::with_capacity(count),
+            initial_basis: Vec::with_capacity(count),
+            objective,
+        };
+        for piece in pieces {
+            // One alone is laid already.
+            if alone {
+                (whole.residual, whole.jacobian) = (piece.residual, piece.jacobian);
+            }
+            whole.initial_step.push(piece.initial_step);
+            whole.initial_by_parameter.push(piece.initial_by_parameter);
+            whole.initial_basis.push(piece.initial_basis);
         }
+        whole
     }
 
     /// The nominal values of the simulator's parameters.
@@ -185,20 +201,22 @@ impl<S: Simulator> Problem<'_, S> {
                 })
                 .collect()
         };
-        let parts: Vec<Vec<DVector<f64>>> = self.parts.par_iter().enumerate().map(of_part).collect();
-        (0..thetas.len())
-            .map(|k| {
-                let rows: usize = parts.iter().map(|p| p[k].len()).sum();
-                let values = parts.iter().flat_map(|p| p[k].iter().copied());
-                DVector::from_iterator(rows, values)
-            })
-            .collect()
+        let mut parts: Vec<Vec<DVector<f64>>> = self.parts.par_iter().enumerate().map(of_part).collect();
+        if let [alone] = parts.as_mut_slice() {
+            return std::mem::take(alone);
+        }
+        (0..thetas.len()).map(|k| joined(parts.iter().map(|part| &part[k]))).collect()
     }
 
     /// Sums of squared residuals at several points, priors of initial states included: lanes of the same runs.
     #[must_use]
     pub fn objectives(&self, points: &[(Vec<f64>, State)]) -> Vec<f64> {
-        let of_part = |(number, part): (usize, &Part<'_, S::Stimulus>)| -> Vec<f64> {
+        self.tried(points).0
+    }
+
+    /// The same, with the residuals: of each part one vector a point.
+    pub(super) fn tried(&self, points: &[(Vec<f64>, State)]) -> (Vec<f64>, Vec<Vec<DVector<f64>>>) {
+        let of_part = |(number, part): (usize, &Part<'_, S::Stimulus>)| -> (Vec<f64>, Vec<DVector<f64>>) {
             let lanes: Vec<Vec<f64>> =
                 points.iter().map(|(theta, state)| theta.iter().chain(&state.values[number]).copied().collect()).collect();
             let prior = |state: &State| -> f64 {
@@ -206,20 +224,24 @@ impl<S: Simulator> Problem<'_, S> {
                 initial.iter().zip(values).map(|(p, v)| (weight(p, state.misfit) * (v - p.nominal)).powi(2)).sum()
             };
             let followed = self.followed_by(part, &lanes);
-            followed.iter().zip(points).map(|(residual, (_, state))| residual.norm_squared() + prior(state)).collect()
+            let sums = followed.iter().zip(points).map(|(residual, (_, state))| residual.norm_squared() + prior(state));
+            (sums.collect(), followed)
         };
-        let parts: Vec<Vec<f64>> = self.parts.par_iter().enumerate().map(of_part).collect();
-        (0..points.len()).map(|k| parts.iter().map(|values| values[k]).sum()).collect()
+        let (sums, residuals): (Vec<Vec<f64>>, Vec<_>) = self.parts.par_iter().enumerate().map(of_part).unzip();
+        ((0..points.len()).map(|k| sums.iter().map(|values| values[k]).sum()).collect(), residuals)
     }
 
+    /// Follows `part` from `at`, a point of the simulator's parameters and one of its initial ones, and its derivatives; what is left
+    /// at that point may be `known`.
     fn follow(
         &self,
         part: &Part<'_, S::Stimulus>,
-        theta: &[f64],
+        at: (&[f64], &[f64]),
         initial: &[Parameter],
-        start: &[f64],
         free: &[usize],
+        known: Option<DVector<f64>>,
     ) -> Followed {
+        let (theta, start) = at;
         let parameters = self.simulator.parameters();
         let steps: Vec<(usize, f64)> = free
             .iter()
@@ -227,14 +249,14 @@ impl<S: Simulator> Problem<'_, S> {
             .chain(initial.iter().enumerate().map(|(k, p)| (theta.len() + k, difference(p, start[k]))))
             .collect();
         let base: Vec<f64> = theta.iter().chain(start).copied().collect();
-        let mut lanes = vec![base.clone()];
+        let mut lanes = if known.is_some() { Vec::new() } else { vec![base.clone()] };
         for (k, step) in &steps {
             let mut lane = base.clone();
             lane[*k] += step;
             lanes.push(lane);
         }
         let mut columns = self.followed_by(part, &lanes).into_iter();
-        let residual = columns.next().unwrap_or_else(|| DVector::zeros(0));
+        let residual = known.or_else(|| columns.next()).unwrap_or_else(|| DVector::zeros(0));
         let mut derivatives: Vec<DVector<f64>> =
             columns.zip(&steps).map(|(moved, (_, step))| (moved - &residual) / *step).collect();
         let by_initial = derivatives.split_off(free.len());
@@ -243,20 +265,13 @@ impl<S: Simulator> Problem<'_, S> {
 
     /// The residuals of `part` in each of `lanes`, some lanes at a time: they take room, and more gain no speed.
     fn followed_by(&self, part: &Part<'_, S::Stimulus>, lanes: &[Vec<f64>]) -> Vec<DVector<f64>> {
-        let mut residuals = Vec::with_capacity(lanes.len());
+        let mut all = Vec::with_capacity(lanes.len());
         let runs = lanes.len().div_ceil(LANES).max(1);
         for some in lanes.chunks(lanes.len().div_ceil(runs).max(1)) {
             let runs = self.simulator.rollout(&Thetas::from_lanes(some), part.recording, part.followed(), self.seed);
-            residuals.extend(runs.iter().map(|run| self.residual(part, run)));
+            all.extend(runs.into_iter().map(|run| DVector::from_vec(residuals(part, run, self.weights, DIVERGED))));
         }
-        residuals
-    }
-
-    fn residual(&self, part: &Part<'_, S::Stimulus>, trajectory: &[crate::sim2real::Simulated]) -> DVector<f64> {
-        let mut out = Vec::new();
-        residuals_into(part, trajectory, self.weights, &mut out);
-        out.iter_mut().filter(|r| !r.is_finite()).for_each(|r| *r = DIVERGED);
-        DVector::from_vec(out)
+        all
     }
 }
 
@@ -305,6 +320,32 @@ fn weight(parameter: &Parameter, misfit: f64) -> f64 {
     parameter.prior.map_or(0.0, |std| misfit / std.max(1e-12 * parameter.scale()))
 }
 
+/// Residuals and derivatives of several pieces, of which so many rows are `measured`, one after the other.
+fn stacked(pieces: &[Piece], measured: &[usize]) -> (DVector<f64>, DMatrix<f64>) {
+    let columns = pieces.first().map_or(0, |p| p.jacobian.ncols());
+    let total: usize = pieces.iter().map(|p| p.residual.len()).sum();
+    let mut residual = DVector::zeros(total);
+    let mut jacobian = DMatrix::zeros(total, columns);
+    let (mut at, mut prior_at) = (0, measured.iter().sum());
+    for (piece, count) in pieces.iter().zip(measured.iter().copied()) {
+        let priors = piece.initial_step.len();
+        for (from, to, rows) in [(0, at, count), (count, prior_at, priors)] {
+            residual.rows_mut(to, rows).copy_from(&piece.residual.rows(from, rows));
+            jacobian.rows_mut(to, rows).copy_from(&piece.jacobian.rows(from, rows));
+        }
+        at += count;
+        prior_at += priors;
+    }
+    (residual, jacobian)
+}
+
+/// One vector after the other.
+fn joined<'a>(parts: impl Iterator<Item = &'a DVector<f64>> + Clone) -> DVector<f64> {
+    let mut all = Vec::with_capacity(parts.clone().map(DVector::len).sum());
+    parts.for_each(|part| all.extend_from_slice(part.as_slice()));
+    DVector::from_vec(all)
+}
+
 /// Takes out of residual and derivatives what the initial state explains, within its priors.
 ///
 /// With `A = [J_i; W]`, where `W` holds the priors' weights, the best step of the initial state leaves
@@ -313,15 +354,16 @@ fn project(run: &Followed, initial: &[Parameter], start: &[f64], misfit: f64) ->
     let Followed { residual, derivatives, by_initial } = run;
     let (rows, count) = (residual.len(), initial.len());
     let weight: Vec<f64> = initial.iter().map(|p| weight(p, misfit)).collect();
-    let mut b = residual.clone().resize_vertically(rows + count, 0.0);
-    for k in 0..count {
-        b[rows + k] = weight[k] * (start[k] - initial[k].nominal);
-    }
+    let priors: Vec<f64> = (0..count).map(|k| weight[k] * (start[k] - initial[k].nominal)).collect();
+    let mut b = DVector::from_vec([residual.as_slice(), &priors].concat());
     let objective = b.norm_squared();
     let below = |columns: &[DVector<f64>]| {
-        let mut all = DMatrix::zeros(rows + count, columns.len());
-        all.column_iter_mut().zip(columns).for_each(|(mut to, from)| to.rows_mut(0, rows).copy_from(from));
-        all
+        let mut all = Vec::with_capacity((rows + count) * columns.len());
+        for column in columns {
+            all.extend_from_slice(column.as_slice());
+            all.resize(all.len() + count, 0.0);
+        }
+        DMatrix::from_vec(rows + count, columns.len(), all)
     };
     let mut jacobian = below(derivatives);
     if count == 0 {

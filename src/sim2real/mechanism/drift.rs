@@ -30,6 +30,10 @@ where
         }
     }
 
+    fn ages(&self) -> bool {
+        true
+    }
+
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let duration = if typical.duration > 0.0 { typical.duration } else { 1.0 };
         let offsets = [0.1, -0.1].map(|part| part * typical.output);

@@ -3,6 +3,7 @@
 use rand_distr::{Distribution, StandardNormal};
 
 use super::decay::{Decay, gained};
+use crate::sim2real::normal_draw::normal;
 use crate::sim2real::{
     About, Draws, Form, LaneChange, LaneDraws, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical,
 };
@@ -106,7 +107,7 @@ where
     fn sense_each(&mut self, times: &[f64], observations: &mut [P::Observation]) {
         for (lane, (observation, time)) in observations.iter_mut().zip(times).enumerate() {
             let (std, value) = (self.std[lane], &mut self.value[lane]);
-            let draw: f64 = StandardNormal.sample(self.lane_draws.lane(lane));
+            let draw = normal(self.lane_draws.lane(lane).bits());
             // What is correlated has to be known from the last row on; the rest is new.
             let new = match self.own[lane].filter(|_| self.coloured) {
                 Some(last) => gained(*time - last, self.correlation_time[lane]),

@@ -238,6 +238,8 @@ pub(super) struct Together<'a> {
     pub group: &'a Group,
     pub keys: &'a [u64],
     pub table: &'a mut DrawTable,
+    /// The environment of the first key.
+    pub first: usize,
     pub level: Level,
 }
 
@@ -246,7 +248,7 @@ impl NullaryFnOnce for Together<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { entries, group, keys, table, level } = self;
+        let Self { entries, group, keys, table, first, level } = self;
         let mut normal = vec![[0.0; AT_ONCE]; group.members.len()];
         for (part, keys) in keys.chunks(AT_ONCE).enumerate() {
             for (z, k) in normal.iter_mut().zip(&group.members) {
@@ -254,7 +256,7 @@ impl NullaryFnOnce for Together<'_> {
             }
             group.correlate(&mut normal);
             for (k, z) in group.members.iter().zip(&mut normal) {
-                let row = &mut table.row_mut(*k)[part * AT_ONCE..][..keys.len()];
+                let row = &mut table.row_mut(*k)[first + part * AT_ONCE..][..keys.len()];
                 entries[*k].fill_by_normal(keys, &mut z[..keys.len()], row, level);
             }
         }

@@ -5,7 +5,7 @@ use pulp::Arch;
 use super::correlation::{Correlation, CorrelationError, Group, groups};
 use super::entry::{Alone, Entry, Part, Together, way};
 use super::level::Level;
-use super::normal::normal_quantile;
+use super::normal::{AT_ONCE, normal_quantile};
 use super::stream::{DrawKey, Occasion, Streams, name_key, uniform};
 use super::{DrawTable, Implausible, Randomized, Target};
 use crate::sim2real::Seed;
@@ -137,7 +137,7 @@ impl Randomizer {
             }
         }
         for group in self.drawn_groups(occasion) {
-            Arch::new().dispatch(Together { entries: &self.entries, group, keys: &keys, table, level });
+            Arch::new().dispatch(Together { entries: &self.entries, group, keys: &keys, table, first: 0, level });
         }
     }
 
@@ -171,6 +171,34 @@ impl Randomizer {
             group.correlate(&mut normal);
             for (k, z) in group.members.iter().zip(&mut normal) {
                 self.entries[*k].fill_by_normal(&[key], z, &mut table.row_mut(*k)[place..=place], level);
+            }
+        }
+    }
+
+    /// The same for the first environments of `table`, as many as there are `keys`, each with a seed of its own and in its episode of
+    /// `episodes`, as environment 0 of it: bit by bit what [`redraw_by`](Self::redraw_by) draws for each.
+    ///
+    /// # Panics
+    /// If there are not as many episodes as keys, or more than environments: an error of the calling code, not of any input.
+    pub fn redraw_each(&self, table: &mut DrawTable, keys: &[DrawKey], occasion: Occasion, episodes: &[u64], level: Level) {
+        let mut own = [0; AT_ONCE];
+        assert_eq!(keys.len(), episodes.len(), "as many episodes as keys");
+        for (part, (keys, episodes)) in keys.chunks(AT_ONCE).zip(episodes.chunks(AT_ONCE)).enumerate() {
+            let own = &mut own[..keys.len()];
+            for ((own, key), episode) in own.iter_mut().zip(keys).zip(episodes) {
+                *own = Streams::of(*key, occasion).environment(0, *episode);
+            }
+            let first = part * AT_ONCE;
+            for (k, entry) in self.entries.iter().enumerate() {
+                let row = &mut table.row_mut(k)[first..first + own.len()];
+                match entry.part_in(occasion) {
+                    Part::Drawn if !entry.grouped => Arch::new().dispatch(Alone { entry, keys: own, row, level }),
+                    Part::Nominal => row.fill(entry.nominal),
+                    Part::Drawn | Part::None => {}
+                }
+            }
+            for group in self.drawn_groups(occasion) {
+                Arch::new().dispatch(Together { entries: &self.entries, group, keys: own, table, first, level });
             }
         }
     }
