@@ -190,7 +190,7 @@ impl OrderLog {
             log.notes.push("the tape shows what the orders of the log did to the market".to_owned());
         }
         let mut measured = log.measure(&executions);
-        log.cost_scatter = log.scatter_of(&measured);
+        log.cost_scatter = log.scatter_of(&measured, &executions);
         let seen: Vec<Option<f64>> = rows.iter().map(|(row, _)| orders[*row].seen_mid).collect();
         measured.extend(log.look_at_seen(&seen));
         Ok(Recording { name: name.to_owned(), time: log.times(), stimulus: log, measured })

@@ -8,7 +8,8 @@ const FINER: f64 = 0.1;
 /// With fewer orders nothing is told of how costs scatter.
 const ENOUGH: usize = 50;
 
-/// Whether `prices` are told finer than in ticks, as averages and prices of venues that improve them are.
+/// Whether `prices` of fills are told finer than in ticks, as those of venues that improve them are and of logs that tell of an order no more
+/// than its average.
 pub(super) fn finer_than(tick_size: f64, prices: impl Iterator<Item = f64>) -> bool {
     let (mut count, mut between) = (0, 0);
     for price in prices {

@@ -1,6 +1,7 @@
 //! How far what a log tells of its orders scatters of itself.
 
 use crate::market::Seen;
+use crate::market::log_rows::Outcome;
 use crate::market::price_scatter::{finer_than, least_scatter};
 use crate::sim2real::Measured;
 
@@ -30,10 +31,10 @@ impl OrderLog {
     }
 
     /// What the costs among `measured` scatter by.
-    pub(super) fn scatter_of(&self, measured: &[Measured]) -> Option<f64> {
+    pub(super) fn scatter_of(&self, measured: &[Measured], executions: &[Outcome]) -> Option<f64> {
         let cost = measured.iter().find(|channel| channel.channel == "cost")?;
         let tick_size = self.market.instrument.tick_size;
-        finer_than(tick_size, self.paid.iter().flatten().copied()).then(|| least_scatter(&cost.samples, &self.columns()))?
+        finer_than(tick_size, of_fills(executions)).then(|| least_scatter(&cost.samples, &self.columns()))?
     }
 
     /// What costs depend on where something is missing, order by order: sizes, spreads, volatility, and what the market did next.
@@ -55,5 +56,38 @@ impl OrderLog {
         }
         let [soon, later] = moves;
         vec![quantity, of_displayed, spread, volatility, soon, later]
+    }
+}
+
+/// At what prices orders were filled, fill by fill: the average of fills in ticks lies between ticks, and is known all the same to what
+/// these are rounded to.
+fn of_fills(executions: &[Outcome]) -> impl Iterator<Item = f64> {
+    executions.iter().flat_map(|execution| &execution.pieces).map(|piece| piece.price)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::market::{InFlight, LoggedFill, Side};
+    use crate::sim2real::Timestamp;
+
+    #[test]
+    fn an_order_filled_at_two_prices_in_ticks_is_told_no_finer() {
+        let executed = |prices: [f64; 2]| {
+            let order = InFlight::market(Side::Buy, 4.0, Timestamp(0), 10.0, 10.0);
+            let fill = |quantity: f64, price: f64| LoggedFill {
+                order_id: "1".to_owned(),
+                filled_at: Timestamp(1),
+                quantity,
+                price,
+                fee: 0.0,
+            };
+            let fills = [fill(1.0, prices[0]), fill(3.0, prices[1])];
+            Outcome::of(&order, &fills.iter().collect::<Vec<_>>())
+        };
+        let in_ticks = [executed([10.01, 10.02])];
+        assert!(finer_than(0.01, in_ticks[0].price.into_iter()), "their average is");
+        assert!(!finer_than(0.01, of_fills(&in_ticks)));
+        assert!(finer_than(0.01, of_fills(&[executed([10.013, 10.02])])));
     }
 }
