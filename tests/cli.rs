@@ -170,7 +170,7 @@ fn mechanisms_are_listed_for_people_and_programs() {
     assert_eq!((forms.len(), forms.iter().filter(|name| **name == "from_rest").count()), (5, 2));
     let spread = rows.iter().find(|row| row["id"] == "half_spread").unwrap();
     let forms: Vec<&str> = spread["forms"].as_array().unwrap().iter().map(|form| form["name"].as_str().unwrap()).collect();
-    assert_eq!(forms, ["fraction", "bps"]);
+    assert_eq!(forms, ["fraction", "bps", "of_volatility"]);
     let saturation = rows.iter().find(|row| row["id"] == "saturation").unwrap();
     assert!(saturation["forms"][0]["parameters"][0]["upper"].is_null());
     let table = scene.run("mechanisms").out;

@@ -106,7 +106,7 @@ fn bad_twins_are_said_with_place_and_remedy() {
     ");
     insta::assert_snapshot!(with("name = \"half_spread\""), @"
     twin.toml:11:1: the parameters of `half_spread` are not complete
-      hint: give `fraction`, or `bps`
+      hint: give `fraction`, or `bps`, or `fraction_of_recent`
     ");
     assert_eq!(with("name = \"half_spread\"\nbps = 1.0"), "no error");
     insta::assert_snapshot!(with("name = \"command_delay\"\nseconds = -1.0"), @"

@@ -12,7 +12,7 @@ use clap::Args;
 use crate::io::{InputError, OutputFolder, Overwrite, RunFile, listed, table_in};
 use crate::market::paper::import::{ImportSettings, import};
 use crate::market::reconcile::{
-    Checked, Compared, Histories, Life, Lives, Reconciliation, Replay, ReplayError, ReplayNote, Showing, clock_difference,
+    Checked, Compared, Histories, Life, Lives, Reconciliation, ReplayError, ReplayNote, Showing, clock_difference, differs,
     lives, reconcile, reconcile_page, replay,
 };
 use crate::market::{MoneyError, Multiplier, PreparedRun, explained, prepare_run};
@@ -120,9 +120,14 @@ impl Reconcile {
         let known = |life: &mut Life| life.multiplier = multipliers.get(life.symbol.as_str()).copied().unwrap_or_default();
         paper.orders.iter_mut().chain(backtest.iter_mut().flat_map(|own| &mut own.orders)).for_each(known);
         progress.tell("replaying", 0, 0);
-        let again = |log: &Lives| self.replayed(prepared, file, &symbols, log);
-        let differs = |log: &Lives| again(log).map(|own| own.differs_from(&log.orders));
-        let (replayed, differs) = rayon::join(|| again(&paper), || backtest.as_ref().map(differs).transpose());
+        let fails_to_run = |error: ReplayError| match error {
+            ReplayError::Run(error) => explained(file, &error),
+            ReplayError::Money(error) => too_large(&self.paper[0], &error),
+        };
+        let start = || prepared.start().map_err(|error| explained(file, &error));
+        let again = || replay(start()?, &symbols, &paper.orders).map_err(fails_to_run);
+        let differs = |own: &Lives| differs(start()?, &symbols, &own.orders).map_err(fails_to_run);
+        let (replayed, differs) = rayon::join(again, || backtest.as_ref().map(differs).transpose());
         let (mut replayed, differs) = (replayed?, differs?);
         let note =
             |note: &ReplayNote| format!("{} orders were not replayed: {} (first: {})", note.orders, note.why, note.first);
@@ -144,14 +149,6 @@ impl Reconcile {
         let (showing, executed) = (Some(&histories as &dyn Showing), Some(replayed.orders.as_slice()));
         let compared = Compared { backtest: &backtest, paper: &paper, replayed: executed, showing, seed };
         reconcile(&compared).map_err(fails)
-    }
-
-    fn replayed(&self, prepared: &PreparedRun, file: &RunFile, symbols: &[&str], log: &Lives) -> Result<Replay, InputError> {
-        let session = prepared.start().map_err(|error| explained(file, &error))?;
-        replay(session, symbols, &log.orders).map_err(|error| match error {
-            ReplayError::Run(error) => explained(file, &error),
-            ReplayError::Money(error) => too_large(&self.paper[0], &error),
-        })
     }
 
     fn tell(&self, found: &Reconciliation, checked: &[Checked], overwrite: Overwrite, screen: &Screen) -> Result<(), Stop> {

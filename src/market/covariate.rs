@@ -53,7 +53,11 @@ pub(super) fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, 
         let of = |row| log.order_of(row).and_then(|number| values.get(number).copied().flatten());
         complete((0..log.rows()).map(of).collect())
     };
-    columns.into_iter().filter_map(|(name, values)| Some((name, by_row(values)?))).collect()
+    // What the market did within a second of a stamp that was cut may have come before the decision: that costs depend on it says
+    // nothing but that.
+    let known = |name: &str| !log.stamps_are_cut() || !name.ends_with("after");
+    let columns = columns.into_iter().filter(|(name, _)| known(name));
+    columns.filter_map(|(name, values)| Some((name, by_row(values)?))).collect()
 }
 
 /// The values with the median of the known in place of the unknown; none where nothing is known.

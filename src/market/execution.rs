@@ -261,6 +261,16 @@ impl Plant for Execution {
         Self::resolution_of(recording, channel)
     }
 
+    fn sent(&self, recording: &Recording<OrderLog>) -> usize {
+        recording.stimulus.sent()
+    }
+
+    /// What costs scatter by, where prices are told finer than in ticks; but of no more than a price that is rounded to its tick.
+    fn scatter(&self, recording: &Recording<OrderLog>, channel: &str) -> f64 {
+        let own = recording.stimulus.cost_scatter().filter(|_| channel == "cost");
+        own.map_or(0.0, |scatter| scatter.min(Self::of_ticks(recording)))
+    }
+
     fn covariates(&self, recording: &Recording<OrderLog>) -> Vec<Covariate> {
         super::covariate::covariates(recording)
     }
@@ -289,10 +299,14 @@ impl Execution {
     const PART_OF_NOISE: f64 = 0.3;
     /// What a place between bounds is off by, as a part of what was displayed.
     const PLACE: f64 = 0.03;
+    /// What a price that is told finer than in ticks, or a mid that was shown, is off by, as a part of what one in ticks is.
+    const FINER: f64 = 0.1;
 
     /// To what precision a log can tell a channel, in its unit: no fit of it can be better than that.
     ///
-    /// - `cost` and `seen` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid;
+    /// - `cost` [bps]: the standard deviation of a price rounded to its tick, `tick / sqrt(12)`, over the mid; a tenth of it where prices
+    ///   are told finer than in ticks;
+    /// - `seen` [bps]: a tenth of the same, for a mid that was seen is one that was shown;
     /// - `fee` [bps]: half a cent over the notional;
     /// - `filled` []: half a lot over the quantity;
     /// - `mid`: a part of what the mid does of itself, in which it is told;
@@ -303,16 +317,25 @@ impl Execution {
     pub fn resolution_of(recording: &Recording<OrderLog>, channel: &str) -> f64 {
         let instrument = recording.stimulus.instrument();
         let of = |order: &InFlight| match channel {
-            "cost" | "seen" => instrument.tick_size / 12.0_f64.sqrt() / order.mid * 1e4,
             "fee" => Self::FEE_ROUNDING / (order.quantity * order.mid) * 1e4,
             "filled" => 0.5 * instrument.lot_size / order.quantity,
             // It is told in what the mid does of itself, of which its rounding is a part.
             "mid" => Self::PART_OF_NOISE,
             _ => 0.0,
         };
-        if channel == "ahead" {
-            return Self::PLACE;
+        match channel {
+            "ahead" => Self::PLACE,
+            "seen" => Self::FINER * Self::of_ticks(recording),
+            "cost" if recording.stimulus.cost_scatter().is_some() => Self::FINER * Self::of_ticks(recording),
+            "cost" => Self::of_ticks(recording),
+            _ => median(recording.stimulus.orders().iter().map(of).collect()).unwrap_or(0.0),
         }
+    }
+
+    /// The standard deviation of a price rounded to its tick [bps of the mid], the median over the orders.
+    fn of_ticks(recording: &Recording<OrderLog>) -> f64 {
+        let tick_size = recording.stimulus.instrument().tick_size;
+        let of = |order: &InFlight| tick_size / 12.0_f64.sqrt() / order.mid * 1e4;
         median(recording.stimulus.orders().iter().map(of).collect()).unwrap_or(0.0)
     }
 }

@@ -11,6 +11,7 @@ use super::{InFlight, LogError, LogMarket, LogTable, LoggedFill, LoggedOrder, Or
 const LEFT_OUT: f64 = 0.01;
 
 /// What became of one order.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Outcome {
     /// Its fills.
     pub pieces: Vec<Piece>,

@@ -60,6 +60,7 @@ mod look;
 mod mail;
 mod margin_call;
 pub mod mechanism;
+mod met_by_report;
 pub mod metric;
 mod money;
 mod order;
@@ -72,6 +73,7 @@ mod past;
 #[cfg(feature = "io")]
 mod preset;
 mod price_assumption;
+mod price_scatter;
 mod quantum;
 mod queue_place;
 mod quote;

@@ -10,6 +10,7 @@ use super::log_clock::Clocked;
 use super::log_entry::fills_of_orders;
 use super::log_rows::{Made, Outcome, Stamps, made, market_orders, on_tape};
 use super::look::{Look, Traded, looks, market_came, shows_own};
+use super::met_by_report::{met_at, met_by_report};
 use super::quantum::quantum;
 use super::queue_place::{Place, Places};
 use super::reversal::{Came, discount};
@@ -21,6 +22,7 @@ use super::{
 
 mod aspects;
 mod met;
+mod scatter;
 
 /// Where the orders of a log went, and what a backtest assumes of them.
 #[derive(Debug, Clone)]
@@ -56,10 +58,16 @@ pub struct OrderLog {
     aspect: Aspect,
     shows_own_orders: bool,
     own_prints: Vec<Option<Timestamp>>,
+    /// When each order met the market at the latest, where print or report tell.
+    met_at: Vec<Option<Timestamp>>,
     /// Number of quotes that were known when each order was decided; none where there are too many.
     known: Vec<u32>,
     shown_delay: Option<ShownDelay>,
     shown_age: Option<f64>,
+    /// What costs scatter by of themselves [bps], where prices are told finer than in ticks.
+    cost_scatter: Option<f64>,
+    /// Whether its stamps were cut, so that what the market did within a second of a decision may have come before it.
+    cut: bool,
     notes: Vec<String>,
 }
 
@@ -104,6 +112,7 @@ impl OrderLog {
         fills_of_orders(orders, fills)?;
         let mut notes = market.tape.notes().to_vec();
         let Stamps { orders, fills, early } = Stamps::of(orders, fills, &market.tape, &mut notes);
+        let cut = early > 0;
         let (orders, fills) = (orders.as_ref(), fills.as_ref());
         let of_order = fills_of_orders(orders, fills)?;
         let Clocked { orders, fills } = Clocked::of(orders, fills, &of_order, &market.tape, early, &mut notes);
@@ -122,11 +131,13 @@ impl OrderLog {
             .zip(&executions)
             .map(|(o, e)| own_print(market.tape.prints(), o.side, o.decided_at, e.first_fill?, &e.pieces))
             .collect();
-        let delays = in_flight.iter().zip(&own_prints).filter_map(|(o, p)| Some(p.as_ref()?.seconds_since(o.decided_at)));
+        let tick_size = market.instrument.tick_size;
+        let told = || met_by_report(&market.tape, market.price, tick_size, &in_flight, &executions).filter(|_| !cut);
+        let met_at = met_at(&own_prints, told, &mut notes);
+        let delays = in_flight.iter().zip(&met_at).filter_map(|(o, met)| Some(met.as_ref()?.seconds_since(o.decided_at)));
         let shown_delay = ShownDelay::of(delays.collect());
         let fills = executions.iter().zip(&own_prints);
         let traded: Vec<Traded> = fills.map(|(execution, print)| Traded::of(*print, execution.first_fill)).collect();
-        let tick_size = market.instrument.tick_size;
         let early = |at: Timestamp| Timestamp(at.0 - early);
         let traded: Vec<(Timestamp, Traded)> = in_flight
             .iter()
@@ -168,7 +179,10 @@ impl OrderLog {
             market,
             shown_delay,
             shown_age: None,
+            cost_scatter: None,
+            cut,
             own_prints,
+            met_at,
             orders: in_flight,
             notes,
         };
@@ -176,6 +190,7 @@ impl OrderLog {
             log.notes.push("the tape shows what the orders of the log did to the market".to_owned());
         }
         let mut measured = log.measure(&executions);
+        log.cost_scatter = log.scatter_of(&measured, &executions);
         let seen: Vec<Option<f64>> = rows.iter().map(|(row, _)| orders[*row].seen_mid).collect();
         measured.extend(log.look_at_seen(&seen));
         Ok(Recording { name: name.to_owned(), time: log.times(), stimulus: log, measured })
@@ -193,6 +208,7 @@ impl OrderLog {
         };
         let measured = [("cost", "bps"), ("fee", "bps"), ("filled", "")].map(lost).into();
         let own_prints = vec![None; orders.len()];
+        let met_at = own_prints.clone();
         let rows = (0..orders.len()).map(Row::Order).collect();
         let shows_own_orders = market.shows_own_orders.unwrap_or(false);
         let log = Self {
@@ -208,8 +224,11 @@ impl OrderLog {
             places: Vec::new(),
             shows_own_orders,
             own_prints,
+            met_at,
             shown_delay: None,
             shown_age: None,
+            cost_scatter: None,
+            cut: false,
             notes: Vec::new(),
         };
         Recording { name: name.to_owned(), time: log.times(), stimulus: log, measured }
@@ -293,7 +312,7 @@ impl OrderLog {
     pub(super) fn seen_on_arrival(&self, row: usize) -> Seen {
         let order = self.orders[row];
         let arrives_at = order.decided_at.plus_seconds(self.shown_delay.and_then(ShownDelay::constant).unwrap_or(0.0));
-        Seen::by(&order.arriving(arrives_at), self.own_prints[row])
+        Seen::by(&order.arriving(arrives_at), self.met_at[row])
     }
 
     /// The orders, in order of decision.
@@ -353,7 +372,7 @@ impl OrderLog {
         &self.market.instrument
     }
 
-    /// The time from decision to the orders' own prints, where the stamps show one.
+    /// The time from decision to the orders' own prints, or to when their reports tell that they met the market, where the stamps show one.
     #[must_use]
     pub fn shown_delay(&self) -> Option<ShownDelay> {
         self.shown_delay

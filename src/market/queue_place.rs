@@ -5,8 +5,8 @@ use crate::sim2real::Timestamp;
 use super::censored::{Bounds, Spread};
 use super::{InFlight, LoggedFill, LoggedOrder, OrderType, Print, Role, Seen, Side, Tape};
 
-/// With fewer orders that tell of their places nothing is told of places.
-const ENOUGH: usize = 15;
+/// With fewer orders that tell of their places nothing is told of places; how sure these make it is asked besides.
+const ENOUGH: usize = 8;
 /// What is known to have stood ahead at the least tells something where that is no less than this part of what was displayed.
 const TELLING: f64 = 0.5;
 /// Places are told of where a mean of their own makes them so much likelier than none, in twice the logarithm (four standard

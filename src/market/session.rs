@@ -178,6 +178,12 @@ impl Session {
         session
     }
 
+    /// The same, but that next to no equity curve is kept: for runs of which the orders alone are looked at.
+    pub(super) fn without_equity(mut self) -> Self {
+        self.equity = EquityCurve::new(Some(i64::MAX), None);
+        self
+    }
+
     /// Rows of data read, and rows in all, where all are in memory.
     #[must_use]
     pub fn progress(&self) -> (usize, Option<usize>) {

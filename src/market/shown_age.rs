@@ -12,10 +12,14 @@ const ROWS: usize = 20_000;
 const ASKED: usize = 400;
 /// Fewer orders than these tell nothing.
 const ENOUGH: usize = 25;
+/// So many that saw something else than what the tape shows are all asked.
+const FEW: usize = 100;
 /// The part of the orders that one age must explain: what was seen of other things than the tape is not for an age to say.
 const EXPLAINED: f64 = 0.95;
 /// Orders that must have seen something else than what the tape shows at their decision, for that to be worth a word.
-const OTHERWISE: usize = 10;
+const OTHERWISE: usize = 4;
+/// The part of those that one age must explain: beside many that saw what the tape shows, it is these that speak for an age.
+const OF_OTHERS: f64 = 0.8;
 
 /// What the log shows of the age of what was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,12 +45,16 @@ pub(super) fn shown_age(quotes: &Quotes, seen: &[(Timestamp, f64)]) -> ShownAge 
         let last = known.checked_sub(1).and_then(|row| quotes.all().get(row)?.mid());
         last.is_some_and(|own| alike(own, *mid))
     };
-    let timely = seen.iter().filter(|one| as_shown(one)).count();
-    if quotes.is_empty() || seen.len() < ENOUGH || seen.len() - timely < OTHERWISE {
+    let timely: Vec<bool> = seen.iter().map(as_shown).collect();
+    let others = timely.iter().filter(|timely| !**timely).count();
+    if quotes.is_empty() || seen.len() < ENOUGH || others < OTHERWISE {
         return ShownAge::Timely;
     }
-    let asked: Vec<&(Timestamp, f64)> = asked(seen.len()).map(|k| &seen[k]).collect();
-    let timely = asked.iter().filter(|one| as_shown(one)).count();
+    // Few that saw something else are all asked.
+    let few = (0..seen.len()).filter(|k| others <= FEW && !timely[*k]);
+    let numbers: Vec<usize> = asked(seen.len()).filter(|k| others > FEW || timely[*k]).chain(few).collect();
+    let asked: Vec<&(Timestamp, f64)> = numbers.iter().map(|k| &seen[*k]).collect();
+    let timely = numbers.iter().filter(|k| timely[**k]).count();
     // An age at which an order begins, and one after which it ceases, to be explained.
     let ages = asked.iter().flat_map(|(decided_at, mid)| ages(quotes, *decided_at, *mid));
     let mut ends: Vec<(i64, i32)> = ages.flat_map(|(least, most)| [(least, 1), (most + 1, -1)]).collect();
@@ -63,7 +71,7 @@ pub(super) fn shown_age(quotes: &Quotes, seen: &[(Timestamp, f64)]) -> ShownAge 
     let (explained, known) = (usize::try_from(best).unwrap_or_default(), asked.len());
     if (explained as f64) < EXPLAINED * known as f64 {
         ShownAge::Unclear { explained, known }
-    } else if explained <= timely {
+    } else if (explained as f64) < timely as f64 + (OF_OTHERS * (known - timely) as f64).max(1.0) {
         ShownAge::Timely
     } else {
         ShownAge::Aged(0.5 * (within.0 + within.1) as f64 / Timestamp::NANOS as f64)
@@ -151,6 +159,26 @@ mod tests {
         assert_eq!(shown_age(&quotes(), &orders(SECOND, 1_000)[..20]), ShownAge::Timely, "too few to tell");
         assert_eq!(shown_age(&quotes(), &orders(SECOND, 5)), ShownAge::Unclear { explained: 80, known: 100 });
         assert_eq!(shown_age(&Quotes::default(), &orders(0, 1_000)), ShownAge::Timely);
+    }
+
+    /// Where the market hardly moves within the age, few orders saw something else, and these agree on it.
+    #[test]
+    fn a_few_that_agree_tell_of_an_age_and_a_few_that_do_not_tell_nothing() {
+        let few = |age: i64| -> Vec<(Timestamp, f64)> {
+            let one = |k: i64| {
+                let at = Timestamp(10 * SECOND + k * SECOND / 4 + (k * 37 % 100) * SECOND / 400);
+                (at, 100.0 + ((at.0 - age) / SECOND) as f64)
+            };
+            (0..700).map(one).collect()
+        };
+        let quick = few(SECOND / 250);
+        let others = quick.iter().filter(|(at, mid)| *mid != 100.0 + (at.0 / SECOND) as f64).count();
+        assert!((4..10).contains(&others), "{others}");
+        let ShownAge::Aged(found) = shown_age(&quotes(), &quick) else { panic!("no age of {others} orders") };
+        assert!((found - 0.004).abs() < 0.0035, "{found}");
+        let mut odd = few(0);
+        (0..6).for_each(|k| odd[100 * k + 7].1 = 100.0 + k as f64);
+        assert_eq!(shown_age(&quotes(), &odd), ShownAge::Timely, "each saw another past");
     }
 
     /// Of many orders some are asked, and few that saw something else are no age.

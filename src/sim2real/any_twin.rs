@@ -100,6 +100,14 @@ impl<T: Twin> Simulator for Kind<T> {
         self.0.resolution(self.own(recording), channel)
     }
 
+    fn sent(&self, recording: &Recording<AnyStimulus>) -> usize {
+        self.0.sent(self.own(recording))
+    }
+
+    fn scatter(&self, recording: &Recording<AnyStimulus>, channel: &str) -> f64 {
+        self.0.scatter(self.own(recording), channel)
+    }
+
     fn covariates(&self, recording: &Recording<AnyStimulus>) -> Vec<Covariate> {
         self.0.covariates(self.own(recording))
     }
@@ -201,6 +209,14 @@ impl Simulator for AnyTwin {
 
     fn resolution(&self, recording: &Recording<AnyStimulus>, channel: &str) -> f64 {
         self.0.resolution(recording, channel)
+    }
+
+    fn sent(&self, recording: &Recording<AnyStimulus>) -> usize {
+        self.0.sent(recording)
+    }
+
+    fn scatter(&self, recording: &Recording<AnyStimulus>, channel: &str) -> f64 {
+        self.0.scatter(recording, channel)
     }
 
     fn covariates(&self, recording: &Recording<AnyStimulus>) -> Vec<Covariate> {

@@ -200,6 +200,14 @@ impl<P: Plant> Simulator for Assembly<P> {
         self.plant.resolution(recording, channel)
     }
 
+    fn sent(&self, recording: &Recording<P::Stimulus>) -> usize {
+        self.plant.sent(recording)
+    }
+
+    fn scatter(&self, recording: &Recording<P::Stimulus>, channel: &str) -> f64 {
+        self.plant.scatter(recording, channel)
+    }
+
     fn covariates(&self, recording: &Recording<P::Stimulus>) -> Vec<Covariate> {
         self.plant.covariates(recording)
     }

@@ -145,6 +145,15 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     fn resolution(&self, _recording: &Recording<Self::Stimulus>, _channel: &str) -> f64 {
         0.0
     }
+    /// The least that a channel of messages scatters whatever explains it, as the messages themselves show it, in its unit; 0 where
+    /// that is not known.
+    fn scatter(&self, _recording: &Recording<Self::Stimulus>, _channel: &str) -> f64 {
+        0.0
+    }
+    /// How many commands a recording of messages holds; of samples of a signal it is as many as there are rows.
+    fn sent(&self, recording: &Recording<Self::Stimulus>) -> usize {
+        recording.time.len()
+    }
     /// What a residual may depend on when something is missing, row by row.
     fn covariates(&self, _recording: &Recording<Self::Stimulus>) -> Vec<Covariate> {
         Vec::new()

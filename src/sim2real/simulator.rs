@@ -28,6 +28,15 @@ pub trait Simulator: Send + Sync {
     fn initial_parameters(&self, recording: &Recording<Self::Stimulus>, row: usize) -> Vec<Parameter>;
     /// Standard deviation of the rounding of a measured channel, in its unit; 0 where none is known.
     fn resolution(&self, recording: &Recording<Self::Stimulus>, channel: &str) -> f64;
+    /// The least that a channel of messages scatters whatever explains it, as the messages themselves show it, in its unit; 0 where
+    /// that is not known. Of samples of a signal their differences tell.
+    fn scatter(&self, _recording: &Recording<Self::Stimulus>, _channel: &str) -> f64 {
+        0.0
+    }
+    /// How many commands a recording of messages holds; of samples of a signal it is as many as there are rows.
+    fn sent(&self, recording: &Recording<Self::Stimulus>) -> usize {
+        recording.time.len()
+    }
     /// What a residual may depend on when something is missing, row by row: the remainder is tested against each.
     fn covariates(&self, recording: &Recording<Self::Stimulus>) -> Vec<Covariate>;
     /// What was left out or is peculiar about `recording`, in words a report can show.

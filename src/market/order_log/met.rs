@@ -54,7 +54,7 @@ impl OrderLog {
 
     /// What order `number` meets as it arrives.
     fn met(&self, number: usize, arriving: &InFlight) -> Met {
-        let seen = Seen::by(arriving, self.own_prints[number]);
+        let seen = Seen::by(arriving, self.met_at[number]);
         let tape = self.tape();
         let decided_at = self.orders[number].decided_at;
         let quote = match self.known.get(number) {

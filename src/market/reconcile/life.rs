@@ -132,6 +132,10 @@ impl Life {
         self.notional = self.notional.plus(fill.price * fill.quantity)?;
         self.fees = self.fees.plus(fill.fee.unwrap_or_default())?;
         self.currency = self.currency.take().or_else(|| fill.currency.clone());
+        // Most have but one.
+        if self.pieces.is_empty() {
+            self.pieces.reserve_exact(1);
+        }
         self.pieces.push(Piece { at: fill.filled_at, quantity: fill.quantity, price: fill.price });
         Ok(())
     }

@@ -32,7 +32,7 @@ pub use life::{Life, Lives, Piece, lives};
 pub use listings::{TitledListing, listings};
 pub use page::reconcile_page;
 pub use reconciliation::{Compared, ReconcileCounts, Reconciliation, reconcile};
-pub use replay::{Replay, ReplayError, ReplayNote, replay};
+pub use replay::{Replay, ReplayError, ReplayNote, differs, replay};
 pub use showing::{Histories, Showing};
 pub use tolerance::{Checked, Tolerance, assert_reconciles};
 pub use words::name as cause_name;

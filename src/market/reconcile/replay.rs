@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::market::paper::OrderWords;
 use crate::market::{
-    BacktestError, Cash, Condition, MoneyError, OrderId, OrderKind, Orders, Quantity, Rejection, Session, Strategy, Ticket,
-    TimeInForce, View,
+    BacktestError, Blotter, Cash, Condition, MoneyError, OrderId, OrderKind, Orders, Quantity, Rejection, Session, Strategy,
+    Ticket, TimeInForce, View,
 };
 use crate::sim2real::Timestamp;
 
@@ -20,23 +20,32 @@ pub struct Replay {
     pub notes: Vec<ReplayNote>,
 }
 
-impl Replay {
-    /// What to say where the run does not make of `orders`, which are its own, what they say: it is another run, or it replaces orders,
-    /// which a replay does not.
-    #[must_use]
-    pub fn differs_from(&self, orders: &[Life]) -> Option<String> {
-        let same = |(own, order): (&Option<Life>, &Life)| {
-            own.as_ref()
-                .is_some_and(|own| (own.filled, own.notional, own.fees) == (order.filled, order.notional, order.fees))
+/// What to say where a run does not make of `orders`, which are its own, what they say: it is another run, or it replaces orders,
+/// which a replay does not. Of each order no more is kept than what it came to.
+///
+/// # Errors
+/// As [`replay`].
+pub fn differs(session: Session, symbols: &[&str], orders: &[Life]) -> Result<Option<String>, ReplayError> {
+    let (strategy, blotter) = executed(session, symbols, orders, &mut |_, _| {})?;
+    let known = places(&strategy, &blotter);
+    let mut sums: Vec<Option<(Quantity, Cash, Cash)>> = vec![None; orders.len()];
+    known.values().for_each(|place| sums[*place] = Some((Quantity::ZERO, Cash::ZERO, Cash::ZERO)));
+    for fill in &blotter.fills {
+        let Some((filled, notional, fees)) = known.get(&fill.order_id).and_then(|place| sums[*place].as_mut()) else {
+            continue;
         };
-        let differ = orders.len() - self.orders.iter().zip(orders).filter(|pair| same(*pair)).count();
-        (differ > 0).then(|| {
-            format!(
-                "the run does not execute {differ} of the {} orders as the backtest has them: is it the run that made the backtest?",
-                orders.len()
-            )
-        })
+        *filled = *filled + fill.quantity;
+        *notional = notional.plus(fill.price * fill.quantity)?;
+        *fees = fees.plus(fill.fee)?;
     }
+    let same = |(sum, order): (&Option<_>, &Life)| *sum == Some((order.filled, order.notional, order.fees));
+    let differ = orders.len() - sums.iter().zip(orders).filter(|pair| same(*pair)).count();
+    Ok((differ > 0).then(|| {
+        format!(
+            "the run does not execute {differ} of the {} orders as the backtest has them: is it the run that made the backtest?",
+            orders.len()
+        )
+    }))
 }
 
 /// Why orders were not replayed.
@@ -66,34 +75,29 @@ pub enum ReplayError {
 ///
 /// # Errors
 /// What fails in the run; sums beyond 128 bits.
-pub fn replay(mut session: Session, symbols: &[&str], orders: &[Life]) -> Result<Replay, ReplayError> {
+pub fn replay(session: Session, symbols: &[&str], orders: &[Life]) -> Result<Replay, ReplayError> {
     let mut why_not: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     let mut left_out = |place: usize, why: String| {
         let own = why_not.entry(why).or_insert((0, place));
         *own = (own.0 + 1, own.1.min(place));
     };
-    let mut strategy = Replayer::default();
-    for (place, order) in orders.iter().enumerate() {
-        match ticket(order, symbols) {
-            Ok(ticket) => strategy.due.push((order.at, place, ticket, order.withdrawn_at)),
-            Err(why) => left_out(place, why),
-        }
-    }
-    while session.advance(&mut strategy, usize::MAX)? {}
-    let record = session.finish()?;
+    let (strategy, blotter) = executed(session, symbols, orders, &mut left_out)?;
     let mut lives: Vec<Option<Life>> = vec![None; orders.len()];
-    let known: HashMap<u64, usize> =
-        record.blotter.orders.iter().filter_map(|o| Some((o.order_id, *strategy.sent.get(&OrderId(o.order_id))?))).collect();
+    let known = places(&strategy, &blotter);
     for place in known.values() {
         let order = orders[*place].clone();
         lives[*place] =
             Some(Life { filled: Quantity::ZERO, notional: Cash::ZERO, fees: Cash::ZERO, pieces: Vec::new(), ..order });
     }
-    for fill in &record.blotter.fills {
+    for fill in &blotter.fills {
         let Some(life) = known.get(&fill.order_id).and_then(|place| lives[*place].as_mut()) else { continue };
         life.filled = life.filled + fill.quantity;
         life.notional = life.notional.plus(fill.price * fill.quantity)?;
         life.fees = life.fees.plus(fill.fee)?;
+        // Most have but one.
+        if life.pieces.is_empty() {
+            life.pieces.reserve_exact(1);
+        }
         life.pieces.push(Piece { at: fill.filled_at, quantity: fill.quantity, price: fill.price });
     }
     let refused = |order: &Life, ticket: &Ticket| {
@@ -101,7 +105,7 @@ pub fn replay(mut session: Session, symbols: &[&str], orders: &[Life]) -> Result
             let Rejection { decided_at, instrument, side, quantity, .. } = **rejection;
             (decided_at, instrument, side, quantity) == (order.at, ticket.instrument, ticket.side, ticket.quantity)
         };
-        let reason = record.blotter.rejections.iter().find(asked).map(|rejection| rejection.reason.word());
+        let reason = blotter.rejections.iter().find(asked).map(|rejection| rejection.reason.word());
         format!("the simulator refused it{}", reason.map_or_else(String::new, |reason| format!(" ({reason})")))
     };
     let sent: HashSet<usize> = strategy.sent.values().copied().collect();
@@ -116,6 +120,31 @@ pub fn replay(mut session: Session, symbols: &[&str], orders: &[Life]) -> Result
     let note =
         |(why, (count, first)): (String, (usize, usize))| ReplayNote { orders: count, why, first: orders[first].id.clone() };
     Ok(Replay { orders: lives, notes: why_not.into_iter().map(note).collect() })
+}
+
+/// Sends the orders in a run until it is over: who sent them, and what became of them. Those that cannot be asked for are `left_out`.
+fn executed(
+    session: Session,
+    symbols: &[&str],
+    orders: &[Life],
+    left_out: &mut dyn FnMut(usize, String),
+) -> Result<(Replayer, Blotter), ReplayError> {
+    let mut session = session.without_equity();
+    let mut strategy = Replayer::default();
+    for (place, order) in orders.iter().enumerate() {
+        match ticket(order, symbols) {
+            Ok(ticket) => strategy.due.push((order.at, place, ticket, order.withdrawn_at)),
+            Err(why) => left_out(place, why),
+        }
+    }
+    while session.advance(&mut strategy, usize::MAX)? {}
+    Ok((strategy, session.finish()?.blotter))
+}
+
+/// The places in the log of the orders that the simulator took, by its own ids.
+fn places(strategy: &Replayer, blotter: &Blotter) -> HashMap<u64, usize> {
+    let taken = blotter.orders.iter();
+    taken.filter_map(|order| Some((order.order_id, *strategy.sent.get(&OrderId(order.order_id))?))).collect()
 }
 
 /// What the simulator is asked for, or why it cannot be asked.

@@ -11,10 +11,11 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::noise::median;
 use super::rivals::Place;
 use super::select::Selection;
+use super::settle::settled_by;
 use super::words::figure;
 use super::{Effect, NextExperiment, Verdict};
 use crate::sim2real::identify::{Effort, Problem, State, fit_smooth};
-use crate::sim2real::{Part, Recording, Thetas, Twin};
+use crate::sim2real::{Clock, Part, Recording, Thetas, Twin};
 
 /// Name of the file with the commands.
 pub const EXPERIMENT_FILE: &str = "next_experiment.csv";
@@ -39,6 +40,10 @@ pub(super) fn next<T: Twin>(
     verdict: Verdict,
     effects: &[Effect],
 ) -> Option<(NextExperiment, Option<Excitation>)> {
+    let messages = inquiry.twin.clock() == Clock::Event;
+    if let Some(more) = settled_by(inquiry, selection, places).filter(|_| messages && verdict != Verdict::Unexplained) {
+        return Some((more, None));
+    }
     if !matches!(verdict, Verdict::Ambiguous | Verdict::NotExcited) || effects.is_empty() {
         return None;
     }
@@ -46,7 +51,11 @@ pub(super) fn next<T: Twin>(
     let own: Vec<&str> = effects.iter().map(|e| e.mechanism.as_str()).collect();
     let all: Vec<&str> = others.iter().map(|(name, _)| name.as_str()).collect();
     let Some(best) = Design::of(inquiry, &selection.selected, &others).and_then(|design| design.best()) else {
-        let what = format!("record with other amplitudes and frequencies, so that {} can be told", apart(&own, &all));
+        let other = match messages {
+            true => "send orders of other sizes and at other intervals, in a market that moves more and less",
+            false => "record with other amplitudes and frequencies",
+        };
+        let what = format!("{other}, so that {} can be told", apart(&own, &all));
         return Some((advice(what, &own, &all), None));
     };
     let told = |tells: bool| -> Vec<&str> {

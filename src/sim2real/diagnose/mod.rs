@@ -37,6 +37,7 @@ mod remainder;
 mod rivals;
 mod screen;
 mod select;
+mod settle;
 mod structure;
 mod uncertainty;
 mod verdict;
@@ -257,12 +258,17 @@ fn followed(
     };
     let comparisons = prove::compared(&contest, inquiry.evidence, seed);
     let known = shown(&trued, selection.selected.twin.parameters());
+    let depends = remainder::dependences(&inquiry, &selection.selected);
+    let fits = prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed);
+    let refuted = verdict::refuted(&inquiry, &selection, &fits);
     let findings = verdict::Findings {
-        fits: prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed),
+        fits,
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
-        remainder: remainder::remainder(&inquiry, &selection),
+        // Of what is refuted nothing was explained.
+        remainder: if refuted { 1.0 } else { remainder::remainder(&inquiry, &selection, &depends) },
+        refuted,
         followed: remainder::followed(&trued, &selection.selected),
-        dependence: remainder::dependence(&inquiry, &selection.selected),
+        dependence: remainder::strongest(&depends),
         foretold: remainder::foretold(&inquiry, &selection.selected),
         std: uncertainty::inflated(&inquiry, &selection.selected, &trued),
         trued: known.clone(),

@@ -26,8 +26,8 @@ fn floor<S: Simulator>(simulator: &S, recording: &Recording<S::Stimulus>, measur
     let rounding = simulator.resolution(recording, &measured.channel);
     let scatter = match simulator.clock() {
         Clock::Sampled { .. } => scatter(&recording.time, &measured.samples),
-        // Messages are no samples of one signal: their differences say nothing of their noise.
-        Clock::Event => 0.0,
+        // Messages are no samples of one signal: differences of those that follow each other say nothing of their noise.
+        Clock::Event => simulator.scatter(recording, &measured.channel),
     };
     let mean = present.iter().sum::<f64>() / present.len().max(1) as f64;
     let spread = (present.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / present.len().max(1) as f64).sqrt();

@@ -7,12 +7,15 @@ use nalgebra::DVector;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::Selection;
 use super::structure::{Dependence, Left, foretold as regression, strongest_dependence};
-use super::whiteness;
+use super::whiteness::{self, ChannelMisfit};
 use crate::sim2real::identify::{Block, Fit, Problem, State};
 use crate::sim2real::{Clock, Covariate, Measured, Part, Recording, Twin};
 
 /// A twin whose mean squared residual is at most this many times the noise needs nothing.
 pub(super) const NEAR_THE_NOISE: f64 = 1.5;
+
+/// Noise of which rounding has this part of the variance is rounding.
+const ALL_OF_IT: f64 = 0.99;
 
 /// A run whose mean squared residual is at most this many times the noise follows what was recorded.
 const FOLLOWED: f64 = 2.0;
@@ -20,8 +23,9 @@ const FOLLOWED: f64 = 2.0;
 /// The part of the recalibrated misfit above the noise that is left: of the channel in which most is left.
 ///
 /// Where rows are messages the misfit is taken about its mean: a constant cost is something that any simulator can be
-/// given, and no measure of what was explained.
-pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> f64 {
+/// given, and no measure of what was explained. How much noise messages have nobody knows but where it is that of rounding: of what is
+/// left elsewhere that counts which depends on something.
+pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, depends: &[OfChannel]) -> f64 {
     let blocks = inquiry.problem(inquiry.twin, &inquiry.evidence.compared).blocks();
     let about_mean = inquiry.twin.clock() == Clock::Event;
     selection
@@ -35,9 +39,20 @@ pub(super) fn remainder<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection
             let sum: f64 = whiteness::of_channel(residual, &blocks, &first.channel).iter().flat_map(|s| s.iter()).sum();
             let constant = if about_mean { sum * sum / count.max(1.0) } else { 0.0 };
             let misfit = first.sum_of_squares - constant - last.level * count;
-            (misfit > (NEAR_THE_NOISE - 1.0) * last.level * count).then(|| last.above(last.level) / misfit)
+            (misfit > (NEAR_THE_NOISE - 1.0) * last.level * count).then(|| left(inquiry, depends, last) / misfit)
         })
         .fold(0.0, f64::max)
+}
+
+/// What is left of a channel that the selected twin leaves like that, of which residuals of messages depend on something.
+fn left<T: Twin>(inquiry: &Inquiry<'_, T>, depends: &[OfChannel], last: &ChannelMisfit) -> f64 {
+    let above = last.above(last.level);
+    // Where noise is rounding and no more, all that is above it is something.
+    if inquiry.twin.clock() != Clock::Event || inquiry.evidence.rounding_of(&last.channel) > ALL_OF_IT {
+        return above;
+    }
+    let own = depends.iter().filter(|one| one.channel == last.channel);
+    own.map(|one| one.dependence.explained).sum::<f64>().min(above)
 }
 
 /// Whether `fit`, that of `selected` in free run, leaves no more than about the noise.
@@ -46,23 +61,38 @@ pub(super) fn followed<T>(fit: &Fit, selected: &Hypothesis<T>) -> bool {
     fit.residual.norm_squared() <= FOLLOWED * level * fit.residual.len() as f64
 }
 
-/// What the remaining residuals of messages depend on most.
-pub(super) fn dependence<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<Dependence> {
-    // Below the noise there is nothing to explain, however regular it is: rounding of the arithmetic is regular too.
-    if inquiry.twin.clock() != Clock::Event || selected.within(NEAR_THE_NOISE) {
-        return None;
+/// What the residuals of a channel of messages depend on most in one recording.
+pub(super) struct OfChannel {
+    channel: String,
+    dependence: Dependence,
+}
+
+/// What the remaining residuals of messages depend on most, channel by channel, of those that leave more than what numbers are rounded
+/// to: below it there is nothing to explain, however regular it is, for rounding is regular too.
+pub(super) fn dependences<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Vec<OfChannel> {
+    let rounded = |channel: &str| {
+        let misfit = selected.misfits.iter().find(|misfit| misfit.channel == channel);
+        misfit.is_none_or(|misfit| misfit.within(NEAR_THE_NOISE, inquiry.evidence.rounding_of(channel)))
+    };
+    if inquiry.twin.clock() != Clock::Event || selected.misfits.iter().all(|misfit| rounded(&misfit.channel)) {
+        return Vec::new();
     }
     let parts = &inquiry.evidence.compared;
     let residual = selected.fit.residual.as_slice();
-    inquiry
-        .problem(&selected.twin, parts)
-        .blocks()
-        .iter()
-        .filter_map(|block| {
-            let covariates = inquiry.twin.covariates(parts[block.part].recording);
-            strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates)
-        })
-        .max_by(|a, b| a.strength.total_cmp(&b.strength))
+    // Looking them up takes as long as a fit where a tape is long.
+    let covariates: Vec<Vec<Covariate>> = parts.iter().map(|part| inquiry.twin.covariates(part.recording)).collect();
+    let blocks = inquiry.problem(&selected.twin, parts).blocks().into_iter().filter(|block| !rounded(&block.channel));
+    let of = |block: Block| {
+        let dependence = strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates[block.part])?;
+        Some(OfChannel { channel: block.channel, dependence })
+    };
+    blocks.filter_map(of).collect()
+}
+
+/// The strongest of them.
+pub(super) fn strongest(depends: &[OfChannel]) -> Option<Dependence> {
+    let all = depends.iter().map(|one| &one.dependence);
+    all.max_by(|a, b| a.strength.total_cmp(&b.strength)).cloned()
 }
 
 /// The part of what is left of sampled signals that the motion foretells on held-out data.

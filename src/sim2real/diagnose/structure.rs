@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::whiteness::autocorrelation_time;
 use crate::sim2real::Covariate;
 
 /// Groups into which a covariate is cut for the F test.
@@ -22,19 +23,22 @@ pub(super) struct Dependence {
     pub on: &'static str,
     /// -log10 of the probability of as strong a dependence by chance.
     pub strength: f64,
+    /// What it explains of the sum of squared residuals, beyond what chance would.
+    pub explained: f64,
 }
 
 /// The strongest dependence of mean residuals on a covariate: a one-way analysis of variance over quantile groups
 /// (Fisher 1925) of the winsorized residuals.
 ///
-/// For residuals that are independent of one another, as those of orders are.
+/// For residuals of orders: what one has in common with the next beside the dependence takes as much away from the evidence.
 pub(super) fn strongest_dependence(residual: &[f64], rows: &[usize], covariates: &[Covariate]) -> Option<Dependence> {
     let winsorized = winsorize(residual);
     covariates
         .iter()
         .filter_map(|(on, values)| {
             let own: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
-            Some(Dependence { on, strength: analysis_of_variance(&winsorized, &own)? })
+            let (strength, explained) = analysis_of_variance(&winsorized, &own)?;
+            Some(Dependence { on, strength, explained })
         })
         .max_by(|a, b| a.strength.total_cmp(&b.strength))
 }
@@ -49,8 +53,10 @@ fn winsorize(residual: &[f64]) -> Vec<f64> {
     residual.iter().map(|r| r.max(-limit).min(limit)).collect()
 }
 
-/// -log10 of the p-value that the mean of `values` is the same in all quantile groups of `by`.
-fn analysis_of_variance(values: &[f64], by: &[f64]) -> Option<f64> {
+/// -log10 of the p-value that the mean of `values` is the same in all quantile groups of `by`, and the sum of squares that the groups
+/// explain beyond chance. Values within groups that have something in common with those before them, as noise that remembers itself
+/// has, count as so many fewer.
+fn analysis_of_variance(values: &[f64], by: &[f64]) -> Option<(f64, f64)> {
     let mut order: Vec<usize> = (0..by.len()).filter(|i| by[*i].is_finite()).collect();
     order.sort_by(|a, b| by[*a].total_cmp(&by[*b]));
     let groups = cut(&order, by);
@@ -61,14 +67,26 @@ fn analysis_of_variance(values: &[f64], by: &[f64]) -> Option<f64> {
     let mean = |rows: &[usize]| rows.iter().map(|i| values[*i]).sum::<f64>() / rows.len() as f64;
     let all = mean(&order);
     let between: f64 = groups.iter().map(|g| g.len() as f64 * (mean(g) - all).powi(2)).sum();
-    let within: f64 = groups.iter().map(|g| g.iter().map(|i| (values[*i] - mean(g)).powi(2)).sum::<f64>()).sum();
+    let mut left: Vec<(usize, f64)> = groups
+        .iter()
+        .flat_map(|group| {
+            let own = mean(group);
+            group.iter().map(move |i| (*i, values[*i] - own))
+        })
+        .collect();
+    let within: f64 = left.iter().map(|(_, left)| left * left).sum();
     let (df1, df2) = ((groups.len() - 1) as f64, (count - groups.len()) as f64);
+    let explained = (between - df1 * within / df2).max(0.0);
     if within <= 0.0 {
-        return Some(if between > 0.0 { 300.0 } else { 0.0 });
+        return Some((if between > 0.0 { 300.0 } else { 0.0 }, explained));
     }
+    // As they follow one another.
+    left.sort_by_key(|(i, _)| *i);
+    let left: Vec<f64> = left.into_iter().map(|(_, left)| left).collect();
+    let remembered = autocorrelation_time(&[&left]).max(1.0);
     let f = FisherSnedecor::new(df1, df2).ok()?;
-    let p = f.sf(between / df1 / (within / df2)).max(1e-300);
-    Some(-p.log10())
+    let p = f.sf(between / df1 / (within / df2) / remembered).max(1e-300);
+    Some((-p.log10(), explained))
 }
 
 /// Quantile groups of the sorted rows; equal values stay together.
@@ -181,6 +199,29 @@ mod tests {
         let covariates = [("size", size)];
         assert!(strongest_dependence(&with, &rows, &covariates).unwrap().strength > 12.0);
         assert!(strongest_dependence(&noise, &rows, &covariates).unwrap().strength < 4.0);
+    }
+
+    /// Noise that remembers itself differs from one time of day to the next, and that says nothing.
+    #[test]
+    fn what_noise_has_in_common_with_itself_is_no_dependence() {
+        let mut rng = Seed(6).stream("structure");
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        let mut last = 0.0;
+        let coloured: Vec<f64> = (0..800)
+            .map(|_| {
+                last = 0.9 * last + draw();
+                last
+            })
+            .collect();
+        let rows: Vec<usize> = (0..800).collect();
+        let number: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
+        let found = strongest_dependence(&coloured, &rows, &[("number", number.clone())]).unwrap();
+        assert!(found.strength < 5.0, "{found:?}");
+        let later: Vec<f64> = coloured.iter().zip(&number).map(|(n, k)| n + 0.012 * k).collect();
+        let found = strongest_dependence(&later, &rows, &[("number", number)]).unwrap();
+        assert!(found.strength > 7.0, "what is there besides is: {found:?}");
+        let all: f64 = later.iter().map(|v| v * v).sum();
+        assert!(found.explained > 0.1 * all && found.explained < all, "{found:?} of {all}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Found;
 use super::diagnosis::{ChannelFit, Checks, Diagnosis, Effect, ParameterChange, SCHEMA, Score, Verdict, Where};
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::remainder::NEAR_THE_NOISE;
+use super::remainder::{NEAR_THE_NOISE, dependences, strongest};
 use super::rivals::Place;
 use super::select::Selection;
 use super::structure::Dependence;
@@ -34,6 +34,8 @@ pub(super) const ABOVE_THE_NOISE: f64 = 2.0;
 const HARDLY_ABOVE: f64 = 1.2;
 /// With fewer rows than this, what is not explained is not called explained either.
 const FEWEST_ROWS: usize = 50;
+/// Larger by less than this, an error is as large.
+const WORSE: f64 = 1.02;
 /// What is less likely than this to be the library's is not said to be.
 const HARDLY_THE_LIBRARY: f64 = 0.1;
 /// The same of a single name, and of what does not carry over to held-out data either.
@@ -56,6 +58,18 @@ pub(super) struct Findings {
     pub sampled: bool,
     /// Whether what knows no noise is off.
     pub inexact: bool,
+    /// Whether what was named of messages is refuted by others, though something is missing.
+    pub refuted: bool,
+}
+
+/// Whether what was named of messages does worse than nothing on those held out, while without it they depend on something: what was
+/// fitted is not what is missing.
+pub(super) fn refuted<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, fits: &[ChannelFit]) -> bool {
+    let messages = inquiry.twin.clock() == Clock::Event && !selection.selected.added.is_empty();
+    messages
+        && !fits.iter().any(|fit| fit.improvement_ci95[0] > 0.0)
+        && fits.iter().any(worse)
+        && strongest(&dependences(inquiry, &selection.recalibrated)).is_some_and(|d| d.strength > DEPENDENT)
 }
 
 /// The whole result.
@@ -207,6 +221,11 @@ fn above_the_noise(fit: &ChannelFit) -> bool {
     fit.recalibrated_rmse * fit.recalibrated_rmse > HARDLY_ABOVE * fit.noise_floor * fit.noise_floor
 }
 
+/// Whether what was named does worse on held-out data than nothing.
+fn worse(fit: &ChannelFit) -> bool {
+    fit.trued_rmse > WORSE * fit.recalibrated_rmse
+}
+
 /// The probability that everything named, or one of its rivals each time, is what is missing: the more that is named and
 /// the less sure, the likelier it is that all of it stands for one thing that is in no registry.
 fn library(effects: &[Effect]) -> f64 {
@@ -232,7 +251,8 @@ fn far_off(fit: &ChannelFit) -> bool {
 
 fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
     let floor = |times: f64| selection.selected.misfits.iter().all(|m| m.within(times, 1.0));
-    let left_over = structured(findings) && !selection.selected.within(HARDLY_ABOVE)
+    // Of messages it is known of which of them it is asked.
+    let left_over = structured(findings) && (!findings.sampled || !selection.selected.within(HARDLY_ABOVE))
         || findings.foretold > FORETOLD_WELL && !floor(HARDLY_ABOVE);
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
@@ -251,7 +271,11 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
         let visible = findings.fits.iter().any(above_the_noise);
-        return if findings.sampled { unconfirmed(library(effects), clean, visible) } else { Verdict::NotExcited };
+        return match findings.sampled {
+            true => unconfirmed(library(effects), clean, visible),
+            false if findings.refuted => Verdict::Unexplained,
+            false => Verdict::NotExcited,
+        };
     }
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
     let doubtful = findings.sampled && library(effects) < least_likely(effects, unseen);
@@ -404,6 +428,7 @@ mod tests {
             trued_mae: trued_rmse,
             improvement_ci95: [0.0, 0.0],
         };
+        assert!(worse(&fit(2.0, 2.1)) && !worse(&fit(2.0, 2.0)));
         assert!(above_the_noise(&fit(1.2, 1.0)) && !above_the_noise(&fit(1.05, 1.0)));
         assert!(far_off(&fit(9.0, 3.1)) && !far_off(&fit(9.0, 2.9)));
         assert!(fails_unseen(&fit(9.0, 3.1)), "a tenth of the misfit is left, far above the noise");

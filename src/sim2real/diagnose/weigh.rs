@@ -20,10 +20,12 @@ const COMPLETES: f64 = 0.8;
 const MORE_THAN_NOISE: f64 = 0.15;
 /// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
 const INFORMATIVE_ROWS: usize = 25;
-/// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were.
+/// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were;
+/// or take away so much of what they are off by, all together, that no less than so many of them tell of it.
 const FEW_ROWS: usize = 4;
 const MOST: f64 = 0.8;
 const RESTORED: f64 = 0.2;
+const TAKEN_AWAY: f64 = 0.9;
 /// Residuals with an autocorrelation time below this [rows] are taken for white.
 const FAIRLY_WHITE: f64 = 2.0;
 /// What stands behind by more than this after a few steps is not followed further.
@@ -220,13 +222,12 @@ pub(super) fn needed<T: Twin>(
     whole: &Hypothesis<T>,
 ) -> bool {
     let enough = whole.added.len() == 1
-        || first.misfits.iter().zip(&less.misfits).zip(&whole.misfits).any(|((first, less), last)| {
-            let explained = less.sum_of_squares - last.sum_of_squares;
-            let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
-            let noise_alone = less.like_noise() && explained < MORE_THAN_NOISE * less.sum_of_squares;
-            explained >= share_of(inquiry.twin.clock(), whole.added.len()) * all
-                || !noise_alone && explained >= COMPLETES * left
-        });
+        || first
+            .misfits
+            .iter()
+            .zip(&less.misfits)
+            .zip(&whole.misfits)
+            .any(|((first, less), last)| explains_enough(inquiry.twin.clock(), whole.added.len(), [first, less, last]));
     let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
     let change = || (0..rows).map(|i| less.fit.residual[i] - whole.fit.residual[i]);
     let moved = change().filter(|d| d.abs() > 1.0).count();
@@ -238,9 +239,39 @@ pub(super) fn needed<T: Twin>(
         (before - after).abs() > 1.0 && after.abs() < RESTORED * before.abs()
     });
     let restored = restored.count();
-    let seen = inquiry.twin.clock() == Clock::Event && restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64;
+    let few = restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64;
+    let pairs: Vec<[f64; 2]> = (0..rows).map(|i| [less.fit.residual[i], whole.fit.residual[i]]).collect();
+    let seen = inquiry.twin.clock() == Clock::Event && (few || takes_away(&pairs) || most_of_few(moved, rows));
     let spread = rows > 40 * INFORMATIVE_ROWS && second * second >= INFORMATIVE_ROWS as f64 * fourth;
     enough && (spread || seen || moved >= INFORMATIVE_ROWS)
+}
+
+/// Whether so many are most of all the messages there are, where these are no more than a few times as many as would tell of anything.
+fn most_of_few(moved: usize, messages: usize) -> bool {
+    messages <= INFORMATIVE_ROWS && moved >= 2 * FEW_ROWS && moved as f64 >= MOST * messages as f64
+}
+
+/// Whether the last of so many mechanisms explains enough of a channel that leaves so much with none, without it and with it. A channel in
+/// which nothing is off speaks for none.
+fn explains_enough(clock: Clock, mechanisms: usize, [first, less, last]: [&ChannelMisfit; 3]) -> bool {
+    let explained = less.sum_of_squares - last.sum_of_squares;
+    let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
+    let noise_alone = less.like_noise() && explained < MORE_THAN_NOISE * less.sum_of_squares;
+    let completes = !noise_alone && explained >= COMPLETES * left;
+    explained > 0.0 && (explained >= share_of(clock, mechanisms) * all || completes)
+}
+
+/// Whether of the messages that are moved, each off by so much before and after, nearly all that they were off by is gone, and more than a
+/// few tell of it: a limit that varies from order to order restores none of them exactly.
+fn takes_away(messages: &[[f64; 2]]) -> bool {
+    let moved = messages.iter().filter(|[before, after]| (before - after).abs() > 1.0);
+    let [mut before, mut after, mut fourth] = [0.0; 3];
+    for [was, is] in moved {
+        before += was * was;
+        after += is * is;
+        fourth += was.powi(4);
+    }
+    before > 0.0 && after <= (1.0 - TAKEN_AWAY) * before && before * before >= FEW_ROWS as f64 * fourth
 }
 
 /// `sum N_e ln(RSS0 / RSS1) - dk ln N_e`, with the effective number of residuals of the *alternative*: autocorrelated
@@ -330,6 +361,35 @@ mod tests {
         assert!(share_of(Clock::Event, 2) > 2.0 * share_of(sampled, 2), "it is not asked whether it carries over");
         assert!(share_of(sampled, 3) > share_of(Clock::Event, 2));
         assert!((share_of(Clock::Event, 3) - share_of(sampled, 3)).abs() < f64::EPSILON);
+    }
+
+    /// Of 671 orders an impact explains nearly all of what they cost, and another one a thousandth; of the part filled nothing is off.
+    #[test]
+    fn a_channel_in_which_nothing_is_off_speaks_for_no_second_mechanism() {
+        let misfit = |mean_square: f64| {
+            let h = leaving(mean_square, 5_900.0);
+            h.misfits.into_iter().next().unwrap()
+        };
+        let enough = |squares: [f64; 3]| {
+            let [first, less, last] = squares.map(misfit);
+            explains_enough(Clock::Event, 2, [&first, &less, &last])
+        };
+        assert!(!enough([38.0, 1.04, 0.99]), "a thousandth of all, and half of what is left");
+        assert!(enough([38.0, 1.5, 0.99]) && enough([3.0, 1.04, 0.99]));
+        assert!(!enough([0.0, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn few_messages_tell_of_a_limit_that_varies_and_one_large_one_does_not() {
+        let cut =
+            |varies: f64| -> Vec<[f64; 2]> { (0..12).map(|k| [-30.0 - k as f64, varies * (k as f64 - 5.5)]).collect() };
+        assert!(takes_away(&cut(1.5)), "none is restored to a fifth, all together are to a tenth");
+        assert!(!takes_away(&cut(3.5)), "too much is left");
+        let mut one = cut(1.0);
+        one.push([-900.0, 2.0]);
+        assert!(!takes_away(&one), "one of them is nearly all there is");
+        assert!(most_of_few(9, 10) && !most_of_few(7, 7) && !most_of_few(9, 12) && !most_of_few(30, 30));
+        assert!(!takes_away(&[[-30.0, 0.0]; 3]) && takes_away(&[[-30.0, 0.0]; 4]) && !takes_away(&[]));
     }
 
     #[test]

@@ -24,8 +24,20 @@ pub struct CommandDelay {
     pub holds: bool,
 }
 
+/// Where delays differ, few are longer than so many times the usual one.
+const SLOW: f64 = 3.0;
 /// The form by which nothing was in force before the first command.
 const FROM_REST: &str = "from_rest";
+
+impl CommandDelay {
+    /// Delays from which fits begin [s]: those that time stamps show come first.
+    fn where_fits_begin(&self, typical: &Typical) -> Vec<f64> {
+        // What differs from command to command is at its longest far longer than usual.
+        let drawn = typical.delays.into_iter().flat_map(|[usual, _]| [SLOW * usual, usual]);
+        let shown = typical.delay.into_iter().chain(drawn).filter(|delay| *delay > 0.0 && *delay <= self.longest);
+        shown.chain(self.starts.iter().copied()).collect()
+    }
+}
 
 impl<P: Plant> Mechanism<P> for CommandDelay {
     fn about(&self) -> About {
@@ -41,8 +53,7 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
     }
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
-        let shown = typical.delay.filter(|delay| *delay > 0.0 && *delay <= self.longest);
-        let starts: Vec<f64> = shown.into_iter().chain(self.starts.iter().copied()).collect();
+        let starts = self.where_fits_begin(typical);
         let delay = |name| {
             let mut delay = Parameter::new(name, "s", 0.0).within(0.0, self.longest).starting_at(&starts);
             delay.smooth = self.holds;
@@ -144,6 +155,20 @@ mod tests {
         let out: Vec<f64> = (0..6).map(|i| line.mean(tick(i, 1.0), 1.75, if i == 0 { 0.0 } else { 1.0 })).collect();
         // The step of t = 1 s arrives at 2.75 s: a quarter of the tick from 2 s on has it.
         assert_eq!(out, [0.0, 0.0, 0.25, 1.0, 1.0, 1.0]);
+    }
+
+    /// Delays of many seconds that differ are not found from starts of a second and less.
+    #[test]
+    fn fits_begin_where_delays_that_differ_are() {
+        let delay = CommandDelay { longest: 60.0, starts: &[0.1, 1.0], holds: false };
+        let starts = |typical: Typical| delay.where_fits_begin(&typical);
+        assert_eq!(starts(Typical::default()), [0.1, 1.0]);
+        assert_eq!(starts(Typical { delays: Some([14.0, 0.5]), ..Typical::default() }), [42.0, 14.0, 0.1, 1.0]);
+        assert_eq!(
+            starts(Typical { delays: Some([30.0, 0.5]), ..Typical::default() }),
+            [30.0, 0.1, 1.0],
+            "90 s are too long"
+        );
     }
 
     #[test]

@@ -1,0 +1,80 @@
+//! Cases of the blind benchmark of markets, of development seeds and of test seeds that are spent, that were once answered wrongly,
+//! each for a reason of its own.
+
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
+
+use trueup::proof::{Case, Domain, Trial};
+use trueup::sim2real::Seed;
+use trueup::sim2real::diagnose::Verdict;
+
+fn tried(seed: u64, index: usize) -> Trial {
+    Case::draw(Domain::Market, Seed(seed), index).tried(&|| 0.0).unwrap()
+}
+
+fn names(trial: &Trial) -> Vec<&str> {
+    let mut names: Vec<&str> = trial.found.iter().map(|found| found.mechanism.as_str()).collect();
+    names.sort_unstable();
+    names
+}
+
+/// Prices are told finer than in ticks, and what depends on them is below a tick: it was taken for rounding.
+#[test]
+fn what_is_below_a_tick_is_something_where_prices_are_finer() {
+    for index in [46, 153] {
+        assert_eq!(tried(1003, index).verdict, Verdict::Unexplained);
+    }
+    assert_eq!(names(&tried(70, 23)), ["volatility_slippage"]);
+}
+
+/// Costs scatter by more than a tick is rounded to, and a law of another form leaves a thirtieth: all that was left was counted.
+#[test]
+fn noise_larger_than_a_tick_is_not_left_unexplained() {
+    let trial = tried(1003, 105);
+    assert_eq!((names(&trial), trial.verdict), (vec!["sqrt_impact"], Verdict::Named));
+}
+
+/// A limit that varies from order to order cuts 23 of 752: it restores none of them exactly.
+#[test]
+fn a_limit_that_varies_is_told_by_few_orders() {
+    let trial = tried(70, 25);
+    assert_eq!((names(&trial), trial.verdict), (vec!["participation_cap"], Verdict::Named));
+}
+
+/// Stamps were cut to a second: what costs have to do with the second after them says nothing else.
+#[test]
+fn stamps_that_were_cut_are_nothing_unknown() {
+    let trial = tried(1003, 177);
+    assert_eq!((names(&trial), trial.verdict), (vec!["half_spread", "lot_size"], Verdict::Named));
+    assert_eq!(tried(70, 70).verdict, Verdict::NoMismatch);
+}
+
+/// Nine orders saw what the tape showed a twentieth of a second before, the others what it showed then, for nothing had moved.
+#[test]
+fn an_age_that_shows_in_few_orders_is_found() {
+    assert_eq!(names(&tried(70, 16)), ["stale_quotes"]);
+}
+
+/// Mids show no spread: a constant was not sought, and what it costs was put down to volatility.
+#[test]
+fn a_spread_is_sought_where_none_is_shown() {
+    assert_eq!(names(&tried(70, 89)), ["half_spread"]);
+}
+
+/// Delays of ten seconds and more that differ, on a tape with own trades and on one without: no fit began there.
+#[test]
+fn delays_of_many_seconds_are_found_by_stamps() {
+    assert_eq!(names(&tried(1003, 139)), ["command_delay"]);
+    assert_eq!(names(&tried(70, 48)), ["command_delay", "commission"]);
+}
+
+/// Purchases cost more than sales: a permanent impact that fits the one day makes the other worse, which is no want of excitation.
+#[test]
+fn what_other_orders_refute_is_something_unknown() {
+    assert_eq!(tried(71, 38).verdict, Verdict::Unexplained);
+}
+
+/// An impact that grows with the power .55 of the size: what the square root is off by is no linear impact besides.
+#[test]
+fn what_the_form_of_an_impact_is_off_by_is_no_second_impact() {
+    assert_eq!(names(&tried(71, 5)), ["sqrt_impact"]);
+}
