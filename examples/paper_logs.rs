@@ -36,6 +36,8 @@ const SETS: [Set; 3] = [
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("name the folder of the logs")?);
+    // Runs are written elsewhere, and name their candles from there.
+    let folder = folder.canonicalize().map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut text = String::from(HEAD);
     let mut details = String::new();
     for set in &SETS {
