@@ -144,19 +144,21 @@ impl Floor {
             here = price;
             let order = &mut self.resting[k];
             let before = (order.left, order.kind);
-            if order.waits() {
+            let sets_off = order.waits();
+            if sets_off {
                 order.set_off();
                 let id = order.id;
                 self.tell(id, at, super::What::SetOff);
             }
             let offer = self.offer(bar, at, price);
-            match self.resting[k].kind {
+            let order = &self.resting[k];
+            // Where the market is beyond its limit already, an order that is set off or released here takes what there is.
+            let (accepts, beyond) = (self.moved.accepts(order, price), self.level_of(order) != Some(price));
+            match order.kind {
                 OrderKind::Market => self.meet_at(k, &offer, true, false),
-                OrderKind::Limit { .. }
-                    if self.moved.accepts(&self.resting[k], price) && before.1 != self.resting[k].kind =>
-                {
-                    self.meet_at(k, &offer, true, false);
-                }
+                OrderKind::Limit { .. } if accepts && (sets_off || beyond) => self.meet_at(k, &offer, true, false),
+                // It waits from now on for the market to come to its limit.
+                OrderKind::Limit { .. } if sets_off => {}
                 _ => {
                     let room = self.room(k, &offer);
                     self.make(k, &offer, room);

@@ -218,6 +218,7 @@ impl Floor {
         }
         self.displace(at);
         let moved = price.plus(self.moved.by());
+        let own = self.own_queue(price, print.aggressor);
         for k in 0..self.resting.len() {
             let order = self.resting[k];
             if order.tradable() <= Quantity::ZERO {
@@ -243,14 +244,15 @@ impl Floor {
                 continue;
             }
             let reached = if price == self.moved.level(order.side, limit) {
-                match (self.rules.limit_fill, &self.shown) {
+                let past_others = match (self.rules.limit_fill, &self.shown) {
                     // Without a book nobody knows what stands ahead: the price has to go beyond the limit.
                     (LimitFill::Through, Shown::Last(_)) => 0.0,
                     (LimitFill::Touch, Shown::Last(_)) => print.size,
                     // By-order data say themselves who left the queue.
                     _ if self.by_order => self.resting[k].place.reached(print.size),
                     _ => self.resting[k].place.traded(print.size),
-                }
+                };
+                past_others - own_ahead(&own, k)
             } else {
                 f64::INFINITY
             };
@@ -259,6 +261,23 @@ impl Floor {
             }
         }
         self.sweep(at);
+    }
+
+    /// The own orders that a trade at `price` may reach where there are several, for each of which the others stand in the queue as
+    /// well: its place, what stands ahead of it that is not ours, and its size [units].
+    fn own_queue(&self, price: Price, aggressor: Option<Side>) -> Vec<(usize, f64, f64)> {
+        let there = |order: &&Resting| {
+            let OrderKind::Limit { price: limit } = order.kind else { return false };
+            aggressor != Some(order.side)
+                && order.tradable() > Quantity::ZERO
+                && self.moved.level(order.side, limit) == price
+        };
+        if self.resting.iter().filter(there).nth(1).is_none() {
+            return Vec::new();
+        }
+        let of =
+            |(k, order): (usize, &Resting)| there(&order).then(|| (k, order.place.in_front(), order.tradable().to_f64()));
+        self.resting.iter().enumerate().filter_map(of).collect()
     }
 
     /// The best price recorded that an order of `side` can take.
@@ -304,6 +323,12 @@ impl Floor {
             _ => self.rows[1],
         }
     }
+}
+
+/// What stands ahead of order `k` in the `own` queue of its price [units]: who came first where as much stands ahead of both.
+fn own_ahead(own: &[(usize, f64, f64)], k: usize) -> f64 {
+    let Some((_, front, _)) = own.iter().find(|(place, ..)| *place == k) else { return 0.0 };
+    own.iter().filter(|(place, before, _)| before < front || before == front && *place < k).map(|(.., size)| size).sum()
 }
 
 /// A size as a quantity, as large as can be where it is not known.

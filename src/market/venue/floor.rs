@@ -377,11 +377,17 @@ impl Floor {
         self.tell(id, at, What::Replaced { quantity: whole, kind });
         if left <= Quantity::ZERO {
             self.end(k, at, Reason::Asked);
-        } else if (grows || price.is_some()) && !self.by_bars && self.is_open() {
-            // What may now take does, and what must not is over.
-            self.resting[k].place = Place::default();
-            self.displace(at);
-            self.meet_shown(k, at);
+        } else if grows || price.is_some() {
+            // Of own orders at one price it comes last from now on.
+            let order = self.resting.remove(k);
+            self.resting.push(order);
+            let k = self.resting.len() - 1;
+            if !self.by_bars && self.is_open() {
+                // What may now take does, and what must not is over.
+                self.resting[k].place = Place::default();
+                self.displace(at);
+                self.meet_shown(k, at);
+            }
         }
         self.sweep(at);
         true

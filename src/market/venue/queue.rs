@@ -104,6 +104,11 @@ impl Place {
         reaches
     }
 
+    /// What stands ahead of it, displayed or not [units].
+    pub fn in_front(&self) -> f64 {
+        self.ahead + self.beyond
+    }
+
     /// Whether nobody knows what stands ahead.
     pub fn is_unknown(&self) -> bool {
         self.ahead.is_infinite()
