@@ -1,4 +1,4 @@
-//! The matching engine under whatever is asked of it: orders of every kind, at random, on random bars, quotes and trades. Nothing is
+//! The matching engine under whatever is asked of it: orders of every kind, at random, on random bars, quotes, books and trades. Nothing is
 //! filled where the data show no market, nothing is filled twice, and who came first is served first.
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
@@ -9,8 +9,8 @@ use market_scene::{instrument, quantity, settings, sized_quotes, venue, whole_ba
 use proptest::prelude::{Just, ProptestConfig, Strategy as Generated, any, prop_assert, prop_oneof, proptest};
 use proptest::test_runner::TestCaseError;
 use trueup::market::{
-    Backtest, Condition, Fill, History, Latencies, Latency, Matching, Order, OrderKind, Orders, Price, Print, Quantity,
-    QueueModel, Quotes, Record, Role, Settings, Side, Status, Strategy, Ticket, TimeInForce, View,
+    Backtest, Condition, DepthAction, DepthChange, Fill, History, Latencies, Latency, Matching, Order, OrderKind, Orders,
+    Price, Print, Quantity, QueueModel, Quotes, Record, Role, Settings, Side, Status, Strategy, Ticket, TimeInForce, View,
 };
 use trueup::sim2real::Timestamp;
 
@@ -250,6 +250,92 @@ proptest! {
             let limit = record.blotter.order(fill.order_id).unwrap().kind.limit();
             let within = limit.is_none_or(|limit| fill.side.accepts(fill.price, limit) || !alone.contains(&fill.order_id));
             prop_assert!(within, "{fill:?}, {limit:?}");
+        }
+        served_in_turn(&record, &alone, |order, fill| order.arrives_at < fill.filled_at)?;
+    }
+}
+
+/// A book of five levels a side whose best prices walk, and trades at or beyond the touch.
+fn random_book() -> impl Generated<Value = History> {
+    proptest::collection::vec((1..50_i64, -3..4_i64, 1..4_i64, 1..200_u32, 0..8_u8, 1..150_u32), 8..120).prop_map(|steps| {
+        let (mut time, mut bid, mut changes, mut prints) = (0, 10_000_i64, Vec::new(), Vec::new());
+        let mut shown: Vec<(Side, i64)> = Vec::new();
+        let price = |cents: i64| Price(cents * 10_000_000);
+        for (gap, step, spread, size, trade, traded) in steps {
+            time += gap;
+            bid += step;
+            let ask = bid + spread;
+            let now: Vec<(Side, i64)> = (0..5).flat_map(|k| [(Side::Buy, bid - k), (Side::Sell, ask + k)]).collect();
+            let mut set = |side: Side, cents: i64, size: f64| {
+                let time = Timestamp(time);
+                changes.push(DepthChange {
+                    time,
+                    known_at: time,
+                    side,
+                    action: DepthAction::Set,
+                    price: price(cents),
+                    size,
+                });
+            };
+            shown.iter().filter(|level| !now.contains(level)).for_each(|(side, cents)| set(*side, *cents, 0.0));
+            now.iter()
+                .enumerate()
+                .for_each(|(k, (side, cents))| set(*side, *cents, f64::from(1 + (size + 37 * k as u32) % 200)));
+            shown = now;
+            let mut print = |cents: i64, aggressor| {
+                let (time, price) = (Timestamp(time), cents as f64 / 100.0);
+                prints.push(Print { time, price, size: f64::from(traded), aggressor: Some(aggressor) });
+            };
+            match trade {
+                0 => print(bid, Side::Sell),
+                1 => print(ask, Side::Buy),
+                2 => print(bid - 2, Side::Sell),
+                3 => print(ask + 2, Side::Buy),
+                _ => {}
+            }
+        }
+        History::default().with_depth(changes).unwrap().with_prints(prints).unwrap()
+    })
+}
+
+/// Best bid and ask by all changes before `time`, or until it.
+fn best(history: &History, time: Timestamp, until: bool) -> [Option<Price>; 2] {
+    let mut levels = std::collections::BTreeMap::new();
+    for change in history.depth().iter().filter(|change| change.time < time || until && change.time == time) {
+        levels.insert((change.side == Side::Sell, change.price), change.size);
+    }
+    let there = |sell: bool| {
+        levels.iter().filter(move |((side, _), size)| *side == sell && **size > 0.0).map(|((_, price), _)| *price)
+    };
+    [there(false).max(), there(true).min()]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn in_a_book_nothing_is_filled_off_it_or_out_of_turn(
+        history in random_book(),
+        draws in any::<u64>(),
+        model in prop_oneof![Just(QueueModel::Trades), Just(QueueModel::Proportional), Just(QueueModel::Log)],
+        order in prop_oneof![Just(0.0), 0.0..3e-7_f64],
+    ) {
+        let order = Latency::Constant { seconds: order };
+        let latencies = Latencies { order: order.clone(), response: order, ..Latencies::default() };
+        let matching = Matching { queue: model, ..Matching::default() };
+        let (record, alone) = run(&history, Settings { latencies, matching, ..settings() }, draws);
+        fills_are_of_orders(&record)?;
+        for fill in &record.blotter.fills {
+            let time = fill.filled_at;
+            let of = |side: usize| [best(&history, time, false)[side], best(&history, time, true)[side]].into_iter().flatten();
+            let traded = || history.prints().iter().filter(|print| print.time == time).map(|p| Price::nearest(p.price).unwrap());
+            let reached = match (fill.why.role, fill.side) {
+                (Role::Taker, Side::Buy) => of(1).any(|price| price == fill.price),
+                (Role::Taker, _) => of(0).any(|price| price == fill.price),
+                (_, Side::Buy) => traded().chain(of(1)).any(|price| price <= fill.price),
+                (_, Side::Sell) => traded().chain(of(0)).any(|price| price >= fill.price),
+            };
+            prop_assert!(reached, "{fill:?} in {:?}", [best(&history, time, false), best(&history, time, true)]);
         }
         served_in_turn(&record, &alone, |order, fill| order.arrives_at < fill.filled_at)?;
     }
