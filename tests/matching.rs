@@ -152,6 +152,13 @@ fn run(history: &History, settings: Settings, draws: u64) -> (Record, Vec<u64>) 
     (backtest.run(&mut strategy).unwrap(), strategy.alone)
 }
 
+/// Queues by `model`, and messages that take `seconds` [s] each way.
+fn queued(model: QueueModel, seconds: f64) -> Settings {
+    let order = Latency::Constant { seconds };
+    let latencies = Latencies { order: order.clone(), response: order, ..Latencies::default() };
+    Settings { latencies, matching: Matching { queue: model, ..Matching::default() }, ..settings() }
+}
+
 /// Every fill is of an order that had arrived, within its limit; together they are what the order says was filled, and no more than
 /// it asked for; nobody stands before the front of a queue.
 fn fills_are_of_orders(record: &Record) -> Result<(), TestCaseError> {
@@ -230,10 +237,7 @@ proptest! {
         model in prop_oneof![Just(QueueModel::Trades), Just(QueueModel::Proportional), Just(QueueModel::Log)],
         order in prop_oneof![Just(0.0), 0.0..3e-7_f64],
     ) {
-        let order = Latency::Constant { seconds: order };
-        let latencies = Latencies { order: order.clone(), response: order, ..Latencies::default() };
-        let matching = Matching { queue: model, ..Matching::default() };
-        let (record, alone) = run(&history, Settings { latencies, matching, ..settings() }, draws);
+        let (record, alone) = run(&history, queued(model, order), draws);
         fills_are_of_orders(&record)?;
         for fill in &record.blotter.fills {
             let quote = history.quotes().all().get(fill.why.row).unwrap();
@@ -320,10 +324,7 @@ proptest! {
         model in prop_oneof![Just(QueueModel::Trades), Just(QueueModel::Proportional), Just(QueueModel::Log)],
         order in prop_oneof![Just(0.0), 0.0..3e-7_f64],
     ) {
-        let order = Latency::Constant { seconds: order };
-        let latencies = Latencies { order: order.clone(), response: order, ..Latencies::default() };
-        let matching = Matching { queue: model, ..Matching::default() };
-        let (record, alone) = run(&history, Settings { latencies, matching, ..settings() }, draws);
+        let (record, alone) = run(&history, queued(model, order), draws);
         fills_are_of_orders(&record)?;
         for fill in &record.blotter.fills {
             let time = fill.filled_at;
