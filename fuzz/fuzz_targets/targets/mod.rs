@@ -1,4 +1,4 @@
-//! What is done with some bytes: a file a reader. The fuzzer runs these, and so does a test (`tests/reader_seeds.rs`).
+//! What is done with some bytes: a file a reader, and one for the engine that matches orders. The fuzzer runs these, and so does a test (`tests/reader_seeds.rs`).
 
 mod account;
 mod columnar;
@@ -7,6 +7,7 @@ mod equations;
 mod history;
 mod journal;
 mod json_row;
+mod matching;
 mod orders;
 mod paper;
 mod paper_log;
@@ -25,7 +26,7 @@ pub use scene::Scene;
 pub type Target = (&'static str, fn(&Scene, &[u8]));
 
 /// The targets, by their names, which are those of their folders in `fuzz/seeds`.
-pub const TARGETS: [Target; 23] = [
+pub const TARGETS: [Target; 24] = [
     ("account", account::target),
     ("arrow", columnar::arrow),
     ("chunks", stream::chunks),
@@ -35,6 +36,7 @@ pub const TARGETS: [Target; 23] = [
     ("history", history::target),
     ("journal", journal::target),
     ("json_row", json_row::target),
+    ("matching", matching::target),
     ("orders", orders::target),
     ("paper_json", paper::json),
     ("paper_log", paper_log::target),

@@ -157,14 +157,24 @@ impl Floor {
         }
         self.displace(at);
         let (to_buy, to_sell) = (self.touch_price(Side::Buy), self.touch_price(Side::Sell));
+        let mut others = false;
         for k in 0..self.resting.len() {
             let order = &self.resting[k];
-            let touch = if order.side == Side::Buy { to_buy } else { to_sell };
-            // What rests behind the touch, as nearly all does, has nothing to do with it.
-            if matches!(order.kind, OrderKind::Limit { .. }) && touch.is_none_or(|touch| !self.moved.reaches(order, touch)) {
+            if !matches!(order.kind, OrderKind::Limit { .. }) {
+                others = true;
                 continue;
             }
-            self.look_at(k, at);
+            // What rests behind the touch, as nearly all does, has nothing to do with it.
+            let touch = if order.side == Side::Buy { to_buy } else { to_sell };
+            if touch.is_some_and(|touch| self.moved.reaches(order, touch)) {
+                self.look_at(k, at);
+            }
+        }
+        // Who rests is met by whoever comes; what the new price sets off comes after that, and finds what is left.
+        for k in (0..self.resting.len()).filter(|_| others) {
+            if !matches!(self.resting[k].kind, OrderKind::Limit { .. }) {
+                self.look_at(k, at);
+            }
         }
         // What is over has been told.
         if !self.is_quiet() {
@@ -217,8 +227,8 @@ impl Floor {
             return;
         }
         self.displace(at);
+        self.line_up(price, at);
         let moved = price.plus(self.moved.by());
-        let own = self.own_queue(price, print.aggressor);
         for k in 0..self.resting.len() {
             let order = self.resting[k];
             if order.tradable() <= Quantity::ZERO {
@@ -244,15 +254,14 @@ impl Floor {
                 continue;
             }
             let reached = if price == self.moved.level(order.side, limit) {
-                let past_others = match (self.rules.limit_fill, &self.shown) {
+                match (self.rules.limit_fill, &self.shown) {
                     // Without a book nobody knows what stands ahead: the price has to go beyond the limit.
                     (LimitFill::Through, Shown::Last(_)) => 0.0,
                     (LimitFill::Touch, Shown::Last(_)) => print.size,
                     // By-order data say themselves who left the queue.
                     _ if self.by_order => self.resting[k].place.reached(print.size),
                     _ => self.resting[k].place.traded(print.size),
-                };
-                past_others - own_ahead(&own, k)
+                }
             } else {
                 f64::INFINITY
             };
@@ -263,21 +272,30 @@ impl Floor {
         self.sweep(at);
     }
 
-    /// The own orders that a trade at `price` may reach where there are several, for each of which the others stand in the queue as
-    /// well: its place, what stands ahead of it that is not ours, and its size [units].
-    fn own_queue(&self, price: Price, aggressor: Option<Side>) -> Vec<(usize, f64, f64)> {
-        let there = |order: &&Resting| {
-            let OrderKind::Limit { price: limit } = order.kind else { return false };
-            aggressor != Some(order.side)
-                && order.tradable() > Quantity::ZERO
-                && self.moved.level(order.side, limit) == price
-        };
-        if self.resting.iter().filter(there).nth(1).is_none() {
-            return Vec::new();
+    /// The first trade of an instant at a `price`: of own orders that wait there, for each of which the others stand in the queue as
+    /// well, those that have less ahead of them come first, and where that is the same those that came first.
+    fn line_up(&mut self, price: Price, at: Timestamp) {
+        if self.printed.replace((at, price)) == Some((at, price)) {
+            return;
         }
-        let of =
-            |(k, order): (usize, &Resting)| there(&order).then(|| (k, order.place.in_front(), order.tradable().to_f64()));
-        self.resting.iter().enumerate().filter_map(of).collect()
+        if let [alone] = &mut self.resting[..] {
+            return alone.place.begin_trades(0.0, self.by_order);
+        }
+        for side in [Side::Buy, Side::Sell] {
+            let there = |order: &Resting| match order.kind {
+                OrderKind::Limit { price: limit } if order.side == side && order.tradable() > Quantity::ZERO => {
+                    self.moved.level(side, limit) == price
+                }
+                _ => false,
+            };
+            let mut own: Vec<usize> = (0..self.resting.len()).filter(|k| there(&self.resting[*k])).collect();
+            own.sort_by(|a, b| self.resting[*a].place.in_front().total_cmp(&self.resting[*b].place.in_front()));
+            let mut ahead = 0.0;
+            for k in own {
+                self.resting[k].place.begin_trades(ahead, self.by_order);
+                ahead += self.allowed(k).to_f64();
+            }
+        }
     }
 
     /// The best price recorded that an order of `side` can take.
@@ -323,12 +341,6 @@ impl Floor {
             _ => self.rows[1],
         }
     }
-}
-
-/// What stands ahead of order `k` in the `own` queue of its price [units]: who came first where as much stands ahead of both.
-fn own_ahead(own: &[(usize, f64, f64)], k: usize) -> f64 {
-    let Some((_, front, _)) = own.iter().find(|(place, ..)| *place == k) else { return 0.0 };
-    own.iter().filter(|(place, before, _)| before < front || before == front && *place < k).map(|(.., size)| size).sum()
 }
 
 /// A size as a quantity, as large as can be where it is not known.

@@ -67,6 +67,8 @@ pub(in crate::market) struct Floor {
     pub(super) by_bars: bool,
     /// The data know the orders of others one by one.
     pub(super) by_order: bool,
+    /// Instant and price of the last trade that met own orders: what else is traded then and there goes through the same queue.
+    pub(super) printed: Option<(Timestamp, Price)>,
     /// A law has something to say of the queues that orders join.
     pub(super) asks_queue: bool,
     /// How far own orders have moved the market.
@@ -107,6 +109,7 @@ impl Floor {
             ambiguous: 0,
             by_bars: false,
             by_order: false,
+            printed: None,
             asks_queue: false,
             moved: Moved::default(),
             others: Others::default(),

@@ -74,34 +74,54 @@ pub(in crate::market) struct Place {
     pub(super) ahead: f64,
     /// What stands behind that and still ahead of it, though it is not displayed [units]: trades reach it before the order.
     beyond: f64,
+    /// What own orders want that stand ahead of it: trades of one instant reach them before it [units].
+    own: f64,
     /// What stood ahead when it joined [units].
     pub(super) joined_behind: f64,
     /// How many events of single orders there had been when it joined: whoever joined by one of these stands ahead.
     pub(super) joined_after: u64,
-    /// What was traded at the price since it was last said what is displayed there [units].
+    /// What was traded at the price since it was last said what is displayed there [units]; of single orders, what of it was ahead.
     traded: f64,
 }
 
 impl Place {
     /// At the end of a queue of `displayed` [units], and of `beyond` [units] that nobody sees.
     pub fn behind(displayed: f64, beyond: f64, joined_after: u64) -> Self {
-        Self { ahead: displayed, beyond, joined_behind: displayed + beyond, joined_after, traded: 0.0 }
+        Self { ahead: displayed, beyond, own: 0.0, joined_behind: displayed + beyond, joined_after, traded: 0.0 }
     }
 
     /// `size` [units] are traded at its price: what of it reaches the order.
     pub fn traded(&mut self, size: f64) -> f64 {
-        let reaches = self.reached(size);
+        let reaches = self.past(size - self.ahead);
         self.ahead = (self.ahead - size).max(0.0);
         self.traded += size;
         reaches
     }
 
-    /// The same where the data say themselves whose orders ahead are gone.
+    /// The same where the data say themselves whose orders ahead are gone: until they do, what was traded stands in `traded` alone.
     pub fn reached(&mut self, size: f64) -> f64 {
-        let past = (size - self.ahead).max(0.0);
-        let reaches = (past - self.beyond).max(0.0);
+        let ahead = (self.ahead - self.traded).max(0.0);
+        self.traded += size.min(ahead);
+        self.past(size - ahead)
+    }
+
+    /// What reaches the order of `size` [units] that have come past all that is displayed ahead of it.
+    fn past(&mut self, size: f64) -> f64 {
+        let past = size.max(0.0);
+        let past_unseen = (past - self.beyond).max(0.0);
+        let reaches = (past_unseen - self.own).max(0.0);
         self.beyond = (self.beyond - past).max(0.0);
+        self.own = (self.own - past_unseen).max(0.0);
         reaches
+    }
+
+    /// Trades of a new instant come, to which `own` [units] of own orders stand ahead of it.
+    pub fn begin_trades(&mut self, own: f64, by_order: bool) {
+        self.own = own;
+        if by_order {
+            // What was traded before is said to be gone by now, or stands there still.
+            self.traded = 0.0;
+        }
     }
 
     /// What stands ahead of it, displayed or not [units].
@@ -139,6 +159,7 @@ impl Place {
     pub fn split(&mut self, units: f64) {
         self.ahead *= units;
         self.beyond *= units;
+        self.own *= units;
         self.joined_behind *= units;
         self.traded *= units;
     }
@@ -146,6 +167,7 @@ impl Place {
     /// An order of `size` [units] that is known to have stood ahead is gone.
     pub fn left_ahead(&mut self, size: f64) {
         self.ahead = (self.ahead - size).max(0.0);
+        self.traded = (self.traded - size).max(0.0);
     }
 }
 
