@@ -1,4 +1,4 @@
-//! Random bytes against every reader: `./x fuzz` builds this, and runs each of the [`targets`].
+//! Random bytes against every reader and the matching engine: `./x fuzz` builds this, and runs each of the [`targets`].
 //!
 //! One program holds them all, because trueup is linked once then; `TRUEUP_FUZZ` names the one that runs. A target stops
 //! the process where a reader panics, or where what it read and wrote is not read again the same. libFuzzer itself stops
