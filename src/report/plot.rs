@@ -167,7 +167,7 @@ pub(super) struct Plot<'a> {
 const WIDE: f64 = 1080.0;
 const NARROW: f64 = 344.0;
 /// Room for the labels of the y axis [px].
-const MARGIN_LEFT: f64 = 62.0;
+const MARGIN_LEFT: f64 = 70.0;
 /// Dots of one series at most.
 const DOTS: usize = 600;
 
