@@ -38,9 +38,11 @@ pub(super) fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, 
         ("number of the order", rows.clone().map(|row| Some(row as f64)).collect()),
         ("price", by_order(&|order| Some(order.mid))),
         ("price within its unit", by_order(&|order| Some(order.mid.rem_euclid(1.0)))),
-        ("assumed price within 5 ticks", by_order(&|order| Some(within_ticks(order, 5.0, tick_size)))),
-        ("assumed price within 10 ticks", by_order(&|order| Some(within_ticks(order, 10.0, tick_size)))),
-        ("assumed price within 100 ticks", by_order(&|order| Some(within_ticks(order, 100.0, tick_size)))),
+        ("touch within 5 ticks", by_book(&|order, book| Some(within_ticks(touch(order, book)?, 5.0, tick_size)))),
+        ("touch within 10 ticks", by_book(&|order, book| Some(within_ticks(touch(order, book)?, 10.0, tick_size)))),
+        ("assumed price within 5 ticks", by_order(&|order| Some(within_ticks(order.assumed, 5.0, tick_size)))),
+        ("assumed price within 10 ticks", by_order(&|order| Some(within_ticks(order.assumed, 10.0, tick_size)))),
+        ("assumed price within 100 ticks", by_order(&|order| Some(within_ticks(order.assumed, 100.0, tick_size)))),
         ("time within a second", by_order(&|order| Some(within(order.decided_at, 1.0)))),
         ("time within 10 s", by_order(&|order| Some(within(order.decided_at, 10.0)))),
         ("time within a minute", by_order(&|order| Some(within(order.decided_at, 60.0)))),
@@ -66,6 +68,11 @@ fn complete(values: Vec<Option<f64>>) -> Option<Vec<f64>> {
     known.sort_by(f64::total_cmp);
     let median = *known.get(known.len() / 2)?;
     Some(values.into_iter().map(|value| value.filter(|v| v.is_finite()).unwrap_or(median)).collect())
+}
+
+/// The best price that the order could take.
+fn touch(order: &InFlight, book: &Book) -> Option<f64> {
+    book.opposite(order.side).first().map(|level| level.price)
 }
 
 fn touch_size(order: &InFlight, book: &Book) -> Option<f64> {
@@ -115,9 +122,9 @@ fn own_flow(orders: &[InFlight], seconds: f64) -> Vec<f64> {
     orders.iter().enumerate().map(flow).collect()
 }
 
-/// Where in a step of so many ticks the assumed price lies [ticks].
-fn within_ticks(order: &InFlight, step: f64, tick_size: f64) -> f64 {
-    (order.assumed / tick_size).round().rem_euclid(step)
+/// Where in a step of so many ticks a `price` lies [ticks].
+fn within_ticks(price: f64, step: f64, tick_size: f64) -> f64 {
+    (price / tick_size).round().rem_euclid(step)
 }
 
 /// Where in a period of so many seconds `time` lies [s].
@@ -138,6 +145,20 @@ mod tests {
     fn unknown_values_take_the_median_and_unknown_columns_go() {
         assert_eq!(complete(vec![Some(1.0), None, Some(3.0), Some(2.0)]), Some(vec![1.0, 2.0, 3.0, 2.0]));
         assert_eq!(complete(vec![None, None]), None);
+    }
+
+    #[test]
+    fn the_touch_is_that_of_the_side_an_order_takes() {
+        let level = |price| crate::market::Level { price, size: 1.0 };
+        let mut quotes = crate::market::Quotes::with_depth(1);
+        quotes.push(Timestamp(0), &[level(99.98)], &[level(100.03)]);
+        let quote = quotes.all().get(0).unwrap();
+        let within = |side| {
+            let order = InFlight::market(side, 1.0, Timestamp(1), 100.0, 100.0);
+            touch(&order, &quote.book()).map(|price| within_ticks(price, 5.0, 0.01))
+        };
+        assert_eq!([within(Side::Buy), within(Side::Sell)], [Some(3.0), Some(3.0)]);
+        assert_eq!(within_ticks(100.05, 5.0, 0.01), 0.0);
     }
 
     #[test]

@@ -9,9 +9,9 @@ use super::{InFlight, LoggedFill, LoggedOrder, OrderType, Print, Role, Seen, Sid
 const ENOUGH: usize = 8;
 /// What is known to have stood ahead at the least tells something where that is no less than this part of what was displayed.
 const TELLING: f64 = 0.5;
-/// Places are told of where a mean of their own makes them so much likelier than none, in twice the logarithm (four standard
+/// Places are told of where a mean of their own makes them so much likelier than none, in twice the logarithm (three standard
 /// errors), and where that mean is this part of what was displayed.
-const CERTAIN: f64 = 16.0;
+const CERTAIN: f64 = 9.0;
 const WORTH_TELLING: f64 = 0.05;
 
 /// The place in its queue of an order that rested at the best price of its own side.
