@@ -346,7 +346,7 @@ fn resolutions_are_those_of_tick_cent_and_lot() {
 fn covariates_have_a_value_an_order_and_rank_the_future_last() {
     let recording = full();
     let covariates = Execution.covariates(&recording);
-    assert_eq!(covariates.len(), 25);
+    assert_eq!(covariates.len(), 27);
     assert!(covariates.iter().all(|(_, values)| values.len() == recording.len() && values.iter().all(|v| v.is_finite())));
     let of = |name: &str| covariates.iter().find(|(n, _)| *n == name).unwrap().1[..3].to_vec();
     assert_eq!(of("quantity / size at the touch"), [20.0 / 30.0, 1.5, 2.5]);
