@@ -8,14 +8,14 @@ mod market_scene;
 
 use std::collections::BTreeMap;
 
-use anything_scene::{fills_are_of_orders, queued, run, served_in_turn};
+use anything_scene::{Draws, fills_are_of_orders, queued, run, served_in_turn};
 use market_scene::{instrument, quantity, settings, venue};
 use proptest::prelude::{
     Just, ProptestConfig, Strategy as Generated, any, prop_assert, prop_assert_eq, prop_oneof, proptest,
 };
 use trueup::market::{
-    Backtest, Condition, History, Order, OrderAction, OrderEvent, OrderId, OrderKind, Orders, Price, Print, QueueModel,
-    Record, Role, Settings, Side, Status, Strategy, Ticket, View,
+    Backtest, Condition, History, Order, OrderAction, OrderEvent, OrderKind, Orders, Price, Print, QueueModel, Record, Role,
+    Settings, Side, Status, Strategy, Ticket, View,
 };
 use trueup::sim2real::Timestamp;
 
@@ -159,17 +159,10 @@ fn random_exchange() -> impl Generated<Value = Exchange> {
 
 /// Sends orders that only rest, and takes some back.
 struct Waits {
-    draws: u64,
+    draws: Draws,
     /// When it took back which.
     taken_back: Vec<(i64, u64)>,
     at: i64,
-}
-
-impl Waits {
-    fn draw(&mut self, below: u64) -> u64 {
-        self.draws = self.draws.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.draws >> 33) % below
-    }
 }
 
 impl Strategy for Waits {
@@ -186,21 +179,21 @@ impl Strategy for Waits {
         }
         self.at = view.now().0;
         let known = view.orders(0).len() as u64;
-        match self.draw(6) {
+        match self.draws.below(6) {
             0..3 => {
-                let side = if self.draw(2) == 0 { Side::Buy } else { Side::Sell };
+                let side = if self.draws.below(2) == 0 { Side::Buy } else { Side::Sell };
                 let Some(best) = view.best(0, side) else { return };
-                let away = self.draw(5) as i64 - 1;
+                let away = self.draws.below(5) as i64 - 1;
                 let price = Price(best.0 - away * TICK * if side == Side::Buy { 1 } else { -1 });
-                let size = 1.0 + self.draw(40) as f64;
+                let size = 1.0 + self.draws.below(40) as f64;
                 let mut ticket = Ticket::new(0, side, quantity(size), OrderKind::Limit { price });
                 ticket.condition = Condition::PostOnly;
                 orders.submit(ticket);
             }
             3 if known > 0 => {
-                let id = view.orders(0)[self.draw(known) as usize].id;
+                let id = view.orders(0)[self.draws.below(known) as usize].id;
                 self.taken_back.push((self.at, id.0));
-                orders.cancel(OrderId(id.0));
+                orders.cancel(id);
             }
             _ => {}
         }
@@ -287,7 +280,7 @@ fn met(record: &Record) -> Vec<(i64, u64, i64)> {
 fn wait_in(exchange: &Exchange, draws: u64) -> (Record, Waits) {
     let settings = Settings { max_leverage: 1e4, ..settings() };
     let backtest = Backtest::new(vec![instrument("A")], vec![exchange.history()], venue(&[]), settings).unwrap();
-    let mut strategy = Waits { draws, taken_back: Vec::new(), at: 0 };
+    let mut strategy = Waits { draws: Draws(draws), taken_back: Vec::new(), at: 0 };
     (backtest.run(&mut strategy).unwrap(), strategy)
 }
 

@@ -244,6 +244,15 @@ fn a_stop_is_set_off_by_the_price_it_would_take() {
     assert_eq!(fills(&record), [(2, 1.0, 103.0)]);
 }
 
+/// A seller comes to 100, where nobody was: who bids more than that has waited for him, and the stop that his price sets off came first
+/// but takes what is left.
+#[test]
+fn who_rests_is_met_before_what_a_price_sets_off() {
+    let rows = [(0, 99.0, 101.0), (1, 99.0, 0.0), (2, 99.0, 100.0)];
+    let plan = event(1).submit(stop(Side::Buy, 100.0, 99.5)).submit(limit(Side::Buy, 5.0, 100.5));
+    assert_eq!(fills(&run(quotes(&rows), &[], plan)), [(2, 5.0, 100.5), (2, 100.0, 100.0)]);
+}
+
 /// 1,000 short at 10 from the second minute of the first day: charged at midnight, when it grows, and at the end.
 #[test]
 fn what_is_held_is_charged_for_the_time_it_was_held() {

@@ -13,16 +13,25 @@ use trueup::sim2real::Timestamp;
 
 use super::market_scene::{instrument, quantity, settings, venue};
 
+/// Draws that are the same at each call, from a linear congruential generator (Knuth's MMIX constants).
+pub struct Draws(pub u64);
+
+impl Draws {
+    pub fn below(&mut self, below: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % below
+    }
+}
+
 /// Asks for whatever it draws, and remembers which orders stand alone, unconditionally and as they were sent.
 pub struct Anything {
-    pub draws: u64,
+    pub draws: Draws,
     pub alone: Vec<u64>,
 }
 
 impl Anything {
     fn draw(&mut self, below: u64) -> u64 {
-        self.draws = self.draws.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.draws >> 33) % below
+        self.draws.below(below)
     }
 
     /// A price within ten ticks of `of`.
@@ -101,7 +110,7 @@ impl Strategy for Anything {
 pub fn run(history: &History, settings: Settings, draws: u64) -> (Record, Vec<u64>) {
     let settings = Settings { max_leverage: 1e3, ..settings };
     let backtest = Backtest::new(vec![instrument("A")], vec![history.clone()], venue(&[]), settings).unwrap();
-    let mut strategy = Anything { draws, alone: Vec::new() };
+    let mut strategy = Anything { draws: Draws(draws), alone: Vec::new() };
     (backtest.run(&mut strategy).unwrap(), strategy.alone)
 }
 
