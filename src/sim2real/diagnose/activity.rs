@@ -29,8 +29,6 @@ const SIMPLER: f64 = 0.03;
 /// Where nothing separates the moments, acting in less than this part of the rows is acting at times; in more, on and off
 /// throughout.
 const AT_TIMES: f64 = 0.2;
-/// Thresholds tried of a covariate.
-const THRESHOLDS: usize = 100;
 
 /// What became of one mechanism.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -267,17 +265,16 @@ impl Rule {
         if acting == 0 || resting == 0 {
             return None;
         }
-        let every = (order.len() / THRESHOLDS / 10).max(1);
         let (mut acting_below, mut resting_below) = (0_u32, 0_u32);
         let mut best: Option<Self> = None;
-        for (at, pair) in order.windows(2).enumerate() {
+        for pair in order.windows(2) {
             if acts[pair[0]] {
                 acting_below += 1
             } else {
                 resting_below += 1
             }
             let (below, above) = (values[pair[0]], values[pair[1]]);
-            if below == above || !at.is_multiple_of(every) {
+            if below == above {
                 continue;
             }
             // Acting above: the acting ones above and the resting ones below are told right.
@@ -319,6 +316,10 @@ mod tests {
         assert_eq!(Rule::best("|command|", "", &values, &others).unwrap().words(), "|command| < 7.3");
         assert_eq!(Rule::best("time", "s", &values, &acts).unwrap().words(), "from 7.25 s on");
         assert_eq!(Rule::best("time", "s", &values, &[true; 1_000]), None);
+        // Values that recur leave few thresholds, and none of them may be missed.
+        let pulses: Vec<f64> = (0..6_000).map(|i| if i % 97 < 70 { 0.0 } else { 2.5 + f64::from(i / 97) * 0.01 }).collect();
+        let acts: Vec<bool> = pulses.iter().map(|u| *u > 0.0).collect();
+        assert_eq!(Rule::best("|command|", "", &pulses, &acts).unwrap().accuracy, 1.0);
         let random: Vec<bool> = (0..1_000).map(|i| (i * i * 31 + i) % 7 < 3).collect();
         assert!(Rule::best("position", "rad", &values, &random).unwrap().accuracy < 0.6);
     }
