@@ -130,6 +130,16 @@ impl<T: Twin> Simulator for Kind<T> {
         self.0.rollout(thetas, self.own(recording), rows, seed)
     }
 
+    fn rollout_measured(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<AnyStimulus>,
+        rows: Range<usize>,
+        seed: Seed,
+    ) -> Vec<Trajectory> {
+        self.0.rollout_measured(thetas, self.own(recording), rows, seed)
+    }
+
     fn rollout_rejoined(
         &self,
         thetas: &Thetas,
@@ -239,6 +249,16 @@ impl Simulator for AnyTwin {
         seed: Seed,
     ) -> Vec<Trajectory> {
         self.0.rollout(thetas, recording, rows, seed)
+    }
+
+    fn rollout_measured(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<AnyStimulus>,
+        rows: Range<usize>,
+        seed: Seed,
+    ) -> Vec<Trajectory> {
+        self.0.rollout_measured(thetas, recording, rows, seed)
     }
 
     fn rollout_rejoined(

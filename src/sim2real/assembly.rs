@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::follow::Collected;
+use super::follow::{Collected, Said};
 use super::run::Run;
 use super::{
     About, Candidate, Channel, Clock, Controller, Covariate, Dynamics, Measured, Mechanism, Parameter, Plant, Recording,
@@ -231,7 +231,17 @@ impl<P: Plant> Simulator for Assembly<P> {
         rows: Range<usize>,
         seed: Seed,
     ) -> Vec<Trajectory> {
-        self.follow(thetas, recording, rows, None, seed)
+        self.follow(thetas, recording, rows, Said::all(self.channels()), seed)
+    }
+
+    fn rollout_measured(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<P::Stimulus>,
+        rows: Range<usize>,
+        seed: Seed,
+    ) -> Vec<Trajectory> {
+        self.follow(thetas, recording, rows, Said::measured(self.channels(), recording), seed)
     }
 
     fn rollout_rejoined(
@@ -242,7 +252,7 @@ impl<P: Plant> Simulator for Assembly<P> {
         every: usize,
         seed: Seed,
     ) -> Option<Vec<Trajectory>> {
-        Some(self.follow(thetas, recording, rows, Some(every.max(1)), seed))
+        Some(self.follow(thetas, recording, rows, Said::all(self.channels()).rejoined(every), seed))
     }
 
     fn commands(&self, recording: &Recording<P::Stimulus>) -> Option<Vec<f64>> {
@@ -281,13 +291,13 @@ impl<P: Plant> Assembly<P> {
         Typical { command, effort, ..typical }
     }
 
-    /// Follows `rows`; every `every` rows, if ever, all lanes go on from the state of the first.
+    /// Follows `rows`, and gives what is to be `said` of them.
     fn follow(
         &self,
         thetas: &Thetas,
         recording: &Recording<P::Stimulus>,
         rows: Range<usize>,
-        every: Option<usize>,
+        said: Said<'_>,
         seed: Seed,
     ) -> Vec<Trajectory> {
         let own = self.parameters.len();
@@ -297,7 +307,7 @@ impl<P: Plant> Assembly<P> {
         let lasting = self.parts.iter().filter(|part| events || part.mechanism.site(part.form) == Site::Command);
         let memory = lasting.map(|part| part.mechanism.memory()).fold(0.0, f64::max);
         let memory = memory + self.controller.as_ref().map_or(0.0, |controller| controller.memory());
-        let mut out = Collected::new(self.channels(), thetas.lanes(), rows.len(), every);
+        let mut out = Collected::new(said, thetas.lanes(), rows.len());
         match self.clock() {
             Clock::Event => out.follow_events(&mut run, recording, rows, memory),
             clock => out.follow_samples(&mut run, recording, rows, clock, memory),

@@ -9,25 +9,50 @@ use super::{Channel, Clock, Measured, Observation, Plant, Recording, Simulated, 
 const COLLECTED: usize = 64;
 
 /// Collects observations, lane by lane and channel by channel.
-pub(super) struct Collected {
+pub(super) struct Collected<'a> {
     trajectories: Vec<Trajectory>,
     /// Room for rows that are not yet in the trajectories, each with all channels of the first lane, then of the second.
     collected: Vec<f64>,
-    channels: usize,
-    /// Rows after which all lanes go on from the state of the first, if ever.
-    every: Option<usize>,
+    said: Said<'a>,
     rows: usize,
 }
 
-impl Collected {
-    pub fn new(channels: &[Channel], lanes: usize, rows: usize, every: Option<usize>) -> Self {
-        let one: Trajectory =
-            channels.iter().map(|c| Simulated { channel: c.name.to_string(), samples: Vec::with_capacity(rows) }).collect();
-        // A clone of an empty vector has no capacity: reserve in each lane.
+/// What a run says on the way.
+pub(super) struct Said<'a> {
+    /// All channels of the plant.
+    channels: &'a [Channel],
+    /// Numbers of those that are said.
+    numbers: Vec<usize>,
+    /// Rows after which all lanes go on from the state of the first, if ever.
+    every: Option<usize>,
+}
+
+impl<'a> Said<'a> {
+    /// All of the plant's `channels`.
+    pub fn all(channels: &'a [Channel]) -> Self {
+        Self { channels, numbers: (0..channels.len()).collect(), every: None }
+    }
+
+    /// Those that `recording` measures.
+    pub fn measured<S>(channels: &'a [Channel], recording: &Recording<S>) -> Self {
+        let numbers = (0..channels.len()).filter(|k| recording.channel(&channels[*k].name).is_some()).collect();
+        Self { channels, numbers, every: None }
+    }
+
+    /// The same where every `every` rows all lanes go on from the state of the first.
+    pub fn rejoined(self, every: usize) -> Self {
+        Self { every: Some(every.max(1)), ..self }
+    }
+}
+
+impl<'a> Collected<'a> {
+    pub fn new(said: Said<'a>, lanes: usize, rows: usize) -> Self {
+        let named = said.numbers.iter().map(|k| said.channels[*k].name.to_string());
+        let one: Trajectory = named.map(|channel| Simulated { channel, samples: Vec::new() }).collect();
         let mut trajectories = vec![one; lanes];
         trajectories.iter_mut().flatten().for_each(|s| s.samples.reserve_exact(rows));
-        let collected = vec![0.0; COLLECTED.min(rows) * lanes * channels.len()];
-        Self { trajectories, collected, channels: channels.len(), every, rows: 0 }
+        let collected = vec![0.0; COLLECTED.min(rows) * lanes * said.numbers.len()];
+        Self { trajectories, collected, said, rows: 0 }
     }
 
     /// Rows are samples: the observation of a row is taken before its command acts.
@@ -42,7 +67,7 @@ impl Collected {
         clock: Clock,
         memory: f64,
     ) {
-        let seen = self.trajectories.first().and_then(|lane| lane.first()).and_then(|s| recording.channel(&s.channel));
+        let seen = self.said.channels.first().and_then(|first| recording.channel(&first.name));
         let since = recording.time[rows.start] - memory;
         let warm = recording.time[..rows.start].partition_point(|t| *t < since);
         for row in warm..rows.end {
@@ -101,16 +126,18 @@ impl Collected {
 
     /// Numbers in a row of all lanes.
     fn width(&self) -> usize {
-        self.trajectories.len() * self.channels
+        self.trajectories.len() * self.said.numbers.len()
     }
 
     fn record<P: Plant>(&mut self, run: &mut Run<P>, time: f64) {
         let width = self.width();
         let row = &mut self.collected[(self.rows % COLLECTED) * width..][..width];
-        for (values, observation) in row.chunks_exact_mut(self.channels.max(1)).zip(run.observe(time)) {
-            values.iter_mut().enumerate().for_each(|(k, value)| *value = observation.channel(k));
+        let numbers = &self.said.numbers;
+        let observed = run.observe(time);
+        for (values, observation) in row.chunks_exact_mut(numbers.len().max(1)).zip(observed) {
+            values.iter_mut().zip(numbers).for_each(|(value, k)| *value = observation.channel(*k));
         }
-        if self.every.is_some_and(|every| self.rows.is_multiple_of(every)) {
+        if self.said.every.is_some_and(|every| self.rows.is_multiple_of(every)) {
             run.rejoin();
         }
         self.rows += 1;

@@ -57,6 +57,17 @@ pub trait Simulator: Send + Sync {
         rows: Range<usize>,
         seed: Seed,
     ) -> Vec<Trajectory>;
+    /// As [`rollout`](Self::rollout), of no more channels than what `recording` is compared with needs: those that it does not
+    /// measure may be left out, for each takes room and time.
+    fn rollout_measured(
+        &self,
+        thetas: &Thetas,
+        recording: &Recording<Self::Stimulus>,
+        rows: Range<usize>,
+        seed: Seed,
+    ) -> Vec<Trajectory> {
+        self.rollout(thetas, recording, rows, seed)
+    }
     /// As [`rollout`](Self::rollout), but every `every` rows all lanes go on from the state of the first: what parts them
     /// then, they did since. None where states cannot be handed over.
     fn rollout_rejoined(

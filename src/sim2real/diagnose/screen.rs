@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
+use crate::sim2real::identify::columns::{gram, products, slices, take_out};
 use crate::sim2real::identify::{Block, State};
 use crate::sim2real::{Candidate, Twin};
 
@@ -87,8 +88,47 @@ impl Ground {
             column.component_mul_assign(&scale);
         }
         let hidden = orthonormal(jacobian);
-        let residual = without(followed.component_mul(&scale), &hidden);
+        let mut residual = followed.component_mul(&scale);
+        without(&mut [residual.as_mut_slice()], &hidden);
         Self { values: values.to_vec(), basis, state, followed, scale, hidden, residual }
+    }
+
+    /// The signatures of points at which these `residuals` are left, projected.
+    fn signatures(&self, residuals: Vec<DVector<f64>>) -> Vec<Signature> {
+        let mut signatures: Vec<Signature> = residuals
+            .into_iter()
+            .map(|mut residual| {
+                let (mut loud, mut whole) = (0.0, 0.0);
+                for ((value, followed), scale) in residual.iter_mut().zip(self.followed.iter()).zip(self.scale.iter()) {
+                    let signature = followed - *value;
+                    loud += signature * signature;
+                    *value = signature * scale;
+                    whole += *value * *value;
+                }
+                Signature { projected: residual, loud: loud.sqrt(), whole: whole.sqrt(), length: 0.0 }
+            })
+            .collect();
+        without(&mut signatures.iter_mut().map(|s| s.projected.as_mut_slice()).collect::<Vec<_>>(), &self.hidden);
+        signatures.iter_mut().for_each(|s| s.length = s.projected.norm());
+        signatures
+    }
+}
+
+/// What a point of a candidate's parameters changes.
+struct Signature {
+    /// With channels brought to the same size, and what the parent's parameters could do taken out.
+    projected: DVector<f64>,
+    /// The length of the change, in units of the noise.
+    loud: f64,
+    /// The length with channels brought to the same size.
+    whole: f64,
+    /// The length of what is left once projected.
+    length: f64,
+}
+
+impl Signature {
+    fn usable(&self) -> bool {
+        self.length > 1e-9 * self.whole && self.whole.is_finite() && self.whole > 0.0
     }
 }
 
@@ -127,12 +167,11 @@ fn orthonormal(columns: DMatrix<f64>) -> DMatrix<f64> {
     if basis.is_empty() { DMatrix::zeros(columns.nrows(), 0) } else { DMatrix::from_columns(&basis) }
 }
 
-fn without(mut v: DVector<f64>, basis: &DMatrix<f64>) -> DVector<f64> {
-    if basis.ncols() > 0 {
-        let along = basis.tr_mul(&v);
-        v.gemv(-1.0, basis, &along, 1.0);
-    }
-    v
+/// Takes out of `columns` what lies along an orthonormal `basis`.
+fn without(columns: &mut [&mut [f64]], basis: &DMatrix<f64>) {
+    let basis = slices(basis);
+    let along = products(&basis, &columns.iter().map(|column| &**column).collect::<Vec<_>>());
+    take_out(columns, &basis, &along);
 }
 
 /// A point of a candidate's parameters as screening saw it.
@@ -157,11 +196,10 @@ fn screen<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, number: usi
         for batch in trials.chunks(batch(trials.len(), trials[0].len())) {
             let thetas: Vec<Vec<f64>> =
                 batch.iter().flatten().map(|point| ground.values.iter().chain(point).copied().collect()).collect();
-            let mut followed = problem.residuals(&thetas, &ground.state, &ground.basis).into_iter();
+            let mut found = ground.signatures(problem.residuals(&thetas, &ground.state, &ground.basis)).into_iter();
             for points in batch {
-                let signatures: Vec<DVector<f64>> =
-                    followed.by_ref().take(points.len()).map(|residual| &ground.followed - residual).collect();
-                loudest = signatures.iter().map(|s| s.norm()).filter(|n| n.is_finite()).fold(loudest, f64::max);
+                let signatures: Vec<Signature> = found.by_ref().take(points.len()).collect();
+                loudest = signatures.iter().map(|s| s.loud).filter(|n| n.is_finite()).fold(loudest, f64::max);
                 let Some((one, signature)) = explained(candidate, points, signatures, ground) else { continue };
                 // Of all points but the best the numbers are enough: signatures are as long as the recordings.
                 if best.as_ref().is_none_or(|best| one.score > best.score) {
@@ -230,37 +268,30 @@ fn trials(candidate: &Candidate) -> Vec<Vec<Vec<f64>>> {
 fn explained(
     candidate: &Candidate,
     points: &[Vec<f64>],
-    signatures: Vec<DVector<f64>>,
+    signatures: Vec<Signature>,
     ground: &Ground,
 ) -> Option<(Tried, DVector<f64>)> {
     let parameters = &candidate.form.parameters;
     let linear: Vec<usize> = (0..parameters.len()).filter(|k| parameters[*k].linear).collect();
-    let projected = |mut signature: DVector<f64>| {
-        signature.component_mul_assign(&ground.scale);
-        let whole = signature.norm();
-        (without(signature, &ground.hidden), whole)
-    };
-    let projected: Vec<(DVector<f64>, f64)> = signatures.into_iter().map(projected).collect();
     let misfit = ground.residual.norm();
-    let usable = |(p, whole): &(DVector<f64>, f64)| p.norm() > 1e-9 * whole && whole.is_finite() && *whole > 0.0;
     if misfit <= 0.0 {
         return None;
     }
     if linear.is_empty() {
-        let (signature, whole) = projected.into_iter().next().filter(usable)?;
-        let length = signature.norm();
-        let score = signature.dot(&ground.residual) / (length * misfit);
+        let Signature { projected, whole, length, .. } = signatures.into_iter().next().filter(Signature::usable)?;
+        let score = projected.dot(&ground.residual) / (length * misfit);
         let survival = length / whole;
-        return Some((Tried { score, survival, start: points[0].clone(), length }, signature / length));
+        return Some((Tried { score, survival, start: points[0].clone(), length }, projected / length));
     }
-    let mut used: Vec<usize> = (0..projected.len()).filter(|i| usable(&projected[*i])).collect();
+    let mut used: Vec<usize> = (0..signatures.len()).filter(|i| signatures[*i].usable()).collect();
     loop {
         if used.is_empty() {
-            return opposed(points, projected.into_iter().find(usable)?);
+            return opposed(points, signatures.into_iter().find(Signature::usable)?);
         }
-        let columns = DMatrix::from_columns(&used.iter().map(|i| projected[*i].0.clone()).collect::<Vec<_>>());
-        let gram = columns.tr_mul(&columns);
-        let weights = gram.pseudo_inverse(1e-12 * columns.norm_squared()).ok()? * columns.tr_mul(&ground.residual);
+        let columns: Vec<&[f64]> = used.iter().map(|i| signatures[*i].projected.as_slice()).collect();
+        let gram = gram(&columns);
+        let least = 1e-12 * gram.trace();
+        let weights = gram.pseudo_inverse(least).ok()? * products(&columns, &[ground.residual.as_slice()]);
         let mut start = points[0].clone();
         linear.iter().for_each(|k| start[*k] = parameters[*k].nominal);
         let mut outside = None;
@@ -275,9 +306,10 @@ fn explained(
             // It would have to act the other way round: it takes no part.
             Some(i) => used.retain(|other| *other != i),
             None => {
-                let signature = &columns * &weights;
+                let mut signature = DVector::zeros(ground.residual.len());
+                take_out(&mut [signature.as_mut_slice()], &columns, &-&weights);
                 let length = signature.norm();
-                let whole: f64 = used.iter().zip(weights.iter()).map(|(i, w)| (w * projected[*i].1).powi(2)).sum();
+                let whole: f64 = used.iter().zip(weights.iter()).map(|(i, w)| (w * signatures[*i].whole).powi(2)).sum();
                 let survival = (length / whole.sqrt()).min(1.0);
                 let tried = Tried { score: length / misfit, survival, start, length };
                 return (length > 0.0).then(|| (tried, signature / length));
@@ -288,10 +320,10 @@ fn explained(
 
 /// A law that would have to act the other way round, at its first start: what refitting hides most of may turn round once
 /// it is fitted jointly.
-fn opposed(points: &[Vec<f64>], (signature, whole): (DVector<f64>, f64)) -> Option<(Tried, DVector<f64>)> {
-    let length = signature.norm();
+fn opposed(points: &[Vec<f64>], signature: Signature) -> Option<(Tried, DVector<f64>)> {
+    let Signature { projected, whole, length, .. } = signature;
     let start = points.first()?.clone();
-    Some((Tried { score: 0.0, survival: length / whole, start, length }, signature / length))
+    Some((Tried { score: 0.0, survival: length / whole, start, length }, projected / length))
 }
 
 /// The start moved along its own direction as far as the misfit reaches, where its law has one parameter and that is of

@@ -3,8 +3,9 @@
 use cobyla::{RhoBeg, StopTols, minimize as cobyla_minimize};
 use rayon::prelude::*;
 
+use super::initial_state::State;
 use super::least_squares::{Effort, Fit, fit_from, fit_smooth, prior_penalty};
-use super::problem::{Problem, State};
+use super::problem::Problem;
 use crate::sim2real::{Clock, Simulator};
 
 /// An improvement smaller than this part of the objective is none: on a plateau the first point found stays.

@@ -7,7 +7,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::problem::{DIFFERENCE, Evaluation, Problem, Runs, State};
+use super::columns::{gram, slices};
+use super::initial_state::State;
+use super::normal::Normal;
+use super::problem::{DIFFERENCE, Problem, Runs};
 use crate::sim2real::{Parameter, Simulator};
 
 /// Directions in which the data move the parameters less than this part of the strongest count as not determined:
@@ -158,9 +161,10 @@ struct Descent<'a, 'b, S: Simulator> {
     free: &'a [usize],
     theta: Vec<f64>,
     state: State,
-    /// At `theta` and `state`.
-    evaluation: Evaluation,
-    /// The same, priors of the parameters included.
+    /// What was followed at `theta` and `state`, and its normal equations.
+    runs: Runs,
+    normal: Normal,
+    /// Sum of squares there, priors of the parameters included.
     objective: f64,
     damping: f64,
     /// The part of the objective that the last step took away.
@@ -174,23 +178,22 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let theta: Vec<f64> = start.iter().zip(parameters).map(|(value, p)| value.clamp(p.lower, p.upper)).collect();
         let state = state.clone();
         let runs = problem.followed(&theta, &state, free);
-        let evaluation = problem.projected(&runs, &state);
-        let mut descent =
-            Self { problem, free, theta, state, evaluation, objective: 0.0, damping: DAMPING, fell: 0.0, ended: false };
-        descent.temper(&runs);
+        let normal = Normal::new(&runs, &state);
+        let (objective, damping, fell) = (0.0, DAMPING, 0.0);
+        let mut descent = Self { problem, free, theta, state, runs, normal, objective, damping, fell, ended: false };
+        descent.temper();
         descent
     }
 
-    /// Holds the priors of initial states against the misfit as it is now; `runs` are those at `theta` and `state`.
-    fn temper(&mut self, runs: &Runs) {
-        let rows = self.evaluation.measured.max(1) as f64;
-        let misfit = (self.evaluation.residual.rows(0, self.evaluation.measured).norm_squared() / rows).sqrt().max(1.0);
+    /// Holds the priors of initial states against the misfit as it is now.
+    fn temper(&mut self) {
+        let misfit = (self.normal.left / self.normal.measured.max(1) as f64).sqrt().max(1.0);
         // Within a tenth nothing is gained by changing what is being minimized.
         if (misfit / self.state.misfit).ln().abs() > 0.1 {
             self.state.misfit = misfit;
-            self.evaluation = self.problem.projected(runs, &self.state);
+            self.normal = Normal::new(&self.runs, &self.state);
         }
-        self.objective = self.evaluation.objective + self.prior(&self.theta);
+        self.objective = self.normal.objective + self.prior(&self.theta);
     }
 
     /// What priors add, held against the misfit as it is: beside an error far above the noise they would count for nothing, and
@@ -248,9 +251,9 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
                 self.damping = (self.damping * SPREAD[k]).max(1e-9);
                 // What is left there has been followed already.
                 let known = residuals.into_iter().map(|part| part.into_iter().nth(k)).collect();
-                let runs = self.problem.followed_beside(known, &self.theta, &self.state, self.free);
-                self.evaluation = self.problem.projected(&runs, &self.state);
-                self.temper(&runs);
+                self.runs = self.problem.followed_beside(known, &self.theta, &self.state, self.free);
+                self.normal = Normal::new(&self.runs, &self.state);
+                self.temper();
                 self.ended |= !matters;
                 return;
             }
@@ -262,9 +265,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
 
     /// `J'J` and `J'r`, priors of the parameters included.
     fn normal_equations(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let jacobian = &self.evaluation.jacobian;
-        let mut information = gram(jacobian);
-        let mut gradient = jacobian.tr_mul(&self.evaluation.residual);
+        let (mut information, mut gradient) = (self.normal.information.clone(), self.normal.gradient.clone());
         for (i, k) in self.free.iter().enumerate() {
             let weight = (self.state.misfit * prior_weight(self.problem, *k)).powi(2);
             information[(i, i)] += weight;
@@ -300,8 +301,8 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         }
         let mut state = self.state.clone();
         for (part, values) in state.values.iter_mut().enumerate() {
-            let along = &self.evaluation.initial_by_parameter[part] * &made;
-            for ((value, step), along) in values.iter_mut().zip(&self.evaluation.initial_step[part]).zip(along.iter()) {
+            let along = &self.normal.initial_by_parameter[part] * &made;
+            for ((value, step), along) in values.iter_mut().zip(self.normal.initial_step[part].iter()).zip(along.iter()) {
                 *value += step - along;
             }
         }
@@ -310,12 +311,13 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
 
     /// Residuals, derivatives and their consequences where the descent has come.
     fn fit(self) -> Fit {
-        let Self { problem, free, theta, state, evaluation, .. } = self;
+        let Self { problem, free, theta, state, runs, .. } = self;
+        let evaluation = problem.projected(&runs, &state);
         let parameters = problem.simulator.parameters();
         let scales: Vec<f64> = free.iter().map(|k| parameters[*k].scale()).collect();
         let mut scaled = evaluation.jacobian.clone();
         scaled.column_iter_mut().zip(&scales).for_each(|(mut column, scale)| column *= *scale);
-        let mut information = gram(&scaled);
+        let mut information = gram(&slices(&scaled));
         let rank = rank(&information);
         for (i, k) in free.iter().enumerate() {
             information[(i, i)] += (state.misfit * prior_weight(problem, *k) * scales[i]).powi(2);
@@ -343,19 +345,6 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             at_bound,
         }
     }
-}
-
-/// Products of all columns with each other; each pair is multiplied once.
-fn gram(columns: &DMatrix<f64>) -> DMatrix<f64> {
-    let count = columns.ncols();
-    let mut products = DMatrix::zeros(count, count);
-    for i in 0..count {
-        for j in 0..=i {
-            let product = columns.column(i).dot(&columns.column(j));
-            (products[(i, j)], products[(j, i)]) = (product, product);
-        }
-    }
-    products
 }
 
 /// `-(H + damping diag H)^-1 g` over the parameters that are not held, in units in which the diagonal of `H` is 1.

@@ -5,15 +5,14 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::sim2real::residual::residuals;
+use super::columns::{products, slices, take_out};
+use super::initial_state::{Reach, State, weight};
+use crate::sim2real::residual::{Expected, residuals};
 use crate::sim2real::{ChannelWeight, Parameter, Part, Seed, Simulator, Thetas};
 
 /// Step of a finite difference, as a part of a parameter's scale: wide enough to smooth over the moments at which dry
 /// friction lets go, which move by whole steps of integration.
 pub(super) const DIFFERENCE: f64 = 1e-4;
-
-/// What a residual that is not a number is taken for: worse than any other, and finite.
-const DIVERGED: f64 = 1e15;
 
 /// Most lanes of one run.
 const LANES: usize = 16;
@@ -67,14 +66,16 @@ pub struct Evaluation {
 }
 
 /// One part followed: residuals and their derivatives, before what initial states explain is taken out.
-struct Followed {
-    residual: DVector<f64>,
-    derivatives: Vec<DVector<f64>>,
-    by_initial: Vec<DVector<f64>>,
+#[derive(Debug)]
+pub(super) struct Followed {
+    pub residual: DVector<f64>,
+    pub derivatives: Vec<DVector<f64>>,
+    pub by_initial: Vec<DVector<f64>>,
 }
 
 /// All parts followed.
-pub(super) struct Runs(Vec<Followed>);
+#[derive(Debug)]
+pub(super) struct Runs(pub Vec<Followed>);
 
 /// One part evaluated: residuals, and one column a perturbed parameter.
 struct Piece {
@@ -189,17 +190,14 @@ impl<S: Simulator> Problem<'_, S> {
         let of_part = |(number, part): (usize, &Part<'_, S::Stimulus>)| -> Vec<DVector<f64>> {
             let lanes: Vec<Vec<f64>> =
                 thetas.iter().map(|theta| theta.iter().chain(&state.values[number]).copied().collect()).collect();
-            let followed = self.followed_by(part, &lanes);
-            followed
-                .into_iter()
-                .map(|mut residual| {
-                    // The priors' rows of the basis meet zeros: only its measured rows count.
-                    let known = basis[number].rows(0, residual.len());
-                    let along = known.tr_mul(&residual);
-                    residual.gemv(-1.0, &known, &along, 1.0);
-                    residual
-                })
-                .collect()
+            let known = slices(&basis[number]);
+            self.followed_by(part, &lanes, |_, mut residual| {
+                // The priors' rows of the basis meet zeros: only its measured rows count.
+                let known: Vec<&[f64]> = known.iter().map(|column| &column[..residual.len()]).collect();
+                let along = products(&known, &[residual.as_slice()]);
+                take_out(&mut [residual.as_mut_slice()], &known, &along);
+                residual
+            })
         };
         let mut parts: Vec<Vec<DVector<f64>>> = self.parts.par_iter().enumerate().map(of_part).collect();
         if let [alone] = parts.as_mut_slice() {
@@ -223,9 +221,13 @@ impl<S: Simulator> Problem<'_, S> {
                 let (initial, values) = (&state.initial[number], &state.values[number]);
                 initial.iter().zip(values).map(|(p, v)| (weight(p, state.misfit) * (v - p.nominal)).powi(2)).sum()
             };
-            let followed = self.followed_by(part, &lanes);
-            let sums = followed.iter().zip(points).map(|(residual, (_, state))| residual.norm_squared() + prior(state));
-            (sums.collect(), followed)
+            let mut sums = Vec::with_capacity(points.len());
+            let followed = self.followed_by(part, &lanes, |_, residual| {
+                sums.push(residual.norm_squared());
+                residual
+            });
+            sums.iter_mut().zip(points).for_each(|(sum, (_, state))| *sum += prior(state));
+            (sums, followed)
         };
         let (sums, residuals): (Vec<Vec<f64>>, Vec<_>) = self.parts.par_iter().enumerate().map(of_part).unzip();
         ((0..points.len()).map(|k| sums.iter().map(|values| values[k]).sum()).collect(), residuals)
@@ -255,57 +257,45 @@ impl<S: Simulator> Problem<'_, S> {
             lane[*k] += step;
             lanes.push(lane);
         }
-        let mut columns = self.followed_by(part, &lanes).into_iter();
-        let residual = known.or_else(|| columns.next()).unwrap_or_else(|| DVector::zeros(0));
-        let mut derivatives: Vec<DVector<f64>> =
-            columns.zip(&steps).map(|(moved, (_, step))| (moved - &residual) / *step).collect();
+        let mut residual = known;
+        let first = lanes.len() - steps.len();
+        let mut derivatives = self.followed_by(part, &lanes, |lane, mut moved| match &residual {
+            Some(base) if lane >= first => {
+                let step = steps[lane - first].1;
+                moved.zip_apply(base, |moved, base| *moved = (*moved - base) / step);
+                moved
+            }
+            _ => {
+                residual = Some(moved);
+                DVector::zeros(0)
+            }
+        });
+        derivatives.drain(..first);
         let by_initial = derivatives.split_off(free.len());
-        Followed { residual, derivatives, by_initial }
+        Followed { residual: residual.unwrap_or_else(|| DVector::zeros(0)), derivatives, by_initial }
     }
 
-    /// The residuals of `part` in each of `lanes`, some lanes at a time: they take room, and more gain no speed.
-    fn followed_by(&self, part: &Part<'_, S::Stimulus>, lanes: &[Vec<f64>]) -> Vec<DVector<f64>> {
+    /// What `finish` makes of the residuals of `part` in each of `lanes`, as soon as they are there.
+    ///
+    /// Some lanes are followed at a time: they take room, and more gain no speed.
+    fn followed_by(
+        &self,
+        part: &Part<'_, S::Stimulus>,
+        lanes: &[Vec<f64>],
+        mut finish: impl FnMut(usize, DVector<f64>) -> DVector<f64>,
+    ) -> Vec<DVector<f64>> {
         let mut all = Vec::with_capacity(lanes.len());
+        let expected = Expected::of(part, self.weights);
         let runs = lanes.len().div_ceil(LANES).max(1);
         for some in lanes.chunks(lanes.len().div_ceil(runs).max(1)) {
-            let runs = self.simulator.rollout(&Thetas::from_lanes(some), part.recording, part.followed(), self.seed);
-            all.extend(runs.into_iter().map(|run| DVector::from_vec(residuals(part, run, self.weights, DIVERGED))));
+            let runs =
+                self.simulator.rollout_measured(&Thetas::from_lanes(some), part.recording, part.followed(), self.seed);
+            for run in runs {
+                let residual = DVector::from_vec(residuals(&expected, run));
+                all.push(finish(all.len(), residual));
+            }
         }
         all
-    }
-}
-
-/// Initial states of all parts during a fit.
-#[derive(Debug, Clone)]
-pub struct State {
-    /// The initial parameters of each part, with their priors.
-    pub initial: Vec<Vec<Parameter>>,
-    /// Their values as they stand.
-    pub values: Vec<Vec<f64>>,
-    /// Root mean square residual that the priors are held against, at least 1: what a wrong model cannot explain must
-    /// not bend the initial state, however small the noise is.
-    pub misfit: f64,
-}
-
-impl State {
-    /// All parts at the estimates their recordings give.
-    #[must_use]
-    pub fn estimated<S: Simulator>(problem: &Problem<'_, S>) -> Self {
-        let initial = problem.initial();
-        Self::at_nominal(initial)
-    }
-
-    /// All parts at the estimates their recordings give, which count for nothing: the fit alone decides.
-    #[must_use]
-    pub fn unknown<S: Simulator>(problem: &Problem<'_, S>) -> Self {
-        let mut initial = problem.initial();
-        initial.iter_mut().flatten().filter(|p| !p.frozen()).for_each(|p| p.prior = None);
-        Self::at_nominal(initial)
-    }
-
-    fn at_nominal(initial: Vec<Vec<Parameter>>) -> Self {
-        let values = initial.iter().map(|p| p.iter().map(|p| p.nominal).collect()).collect();
-        Self { initial, values, misfit: 1.0 }
     }
 }
 
@@ -313,11 +303,6 @@ impl State {
 fn difference(parameter: &Parameter, value: f64) -> f64 {
     let step = DIFFERENCE * parameter.scale().max(0.1 * if value.is_finite() { value.abs() } else { 0.0 });
     if value + step > parameter.upper { -step } else { step }
-}
-
-/// The weight of an initial parameter's prior: none where it is flat.
-fn weight(parameter: &Parameter, misfit: f64) -> f64 {
-    parameter.prior.map_or(0.0, |std| misfit / std.max(1e-12 * parameter.scale()))
 }
 
 /// Residuals and derivatives of several pieces, of which so many rows are `measured`, one after the other.
@@ -351,37 +336,23 @@ fn joined<'a>(parts: impl Iterator<Item = &'a DVector<f64>> + Clone) -> DVector<
 /// With `A = [J_i; W]`, where `W` holds the priors' weights, the best step of the initial state leaves
 /// `b - Q Q' b` of `b = [r; W d]`, and likewise of every column of the Jacobian.
 fn project(run: &Followed, initial: &[Parameter], start: &[f64], misfit: f64) -> Piece {
-    let Followed { residual, derivatives, by_initial } = run;
+    let Followed { residual, derivatives, .. } = run;
     let (rows, count) = (residual.len(), initial.len());
-    let weight: Vec<f64> = initial.iter().map(|p| weight(p, misfit)).collect();
-    let priors: Vec<f64> = (0..count).map(|k| weight[k] * (start[k] - initial[k].nominal)).collect();
-    let mut b = DVector::from_vec([residual.as_slice(), &priors].concat());
+    let reach = Reach::new(run, initial, start, misfit);
+    let mut b = DVector::from_vec([residual.as_slice(), reach.priors()].concat());
     let objective = b.norm_squared();
-    let below = |columns: &[DVector<f64>]| {
-        let mut all = Vec::with_capacity((rows + count) * columns.len());
-        for column in columns {
-            all.extend_from_slice(column.as_slice());
-            all.resize(all.len() + count, 0.0);
-        }
-        DMatrix::from_vec(rows + count, columns.len(), all)
-    };
-    let mut jacobian = below(derivatives);
-    if count == 0 {
-        let initial_by_parameter = DMatrix::zeros(0, derivatives.len());
-        let initial_basis = DMatrix::zeros(rows, 0);
-        return Piece { residual: b, jacobian, initial_step: Vec::new(), initial_by_parameter, initial_basis, objective };
+    let mut below = Vec::with_capacity((rows + count) * derivatives.len());
+    for column in derivatives {
+        below.extend_from_slice(column.as_slice());
+        below.resize(below.len() + count, 0.0);
     }
-    let mut a = below(by_initial);
-    (0..count).for_each(|k| a[(rows + k, k)] = weight[k]);
-    let qr = a.qr();
-    let (q, r) = (qr.q(), qr.r());
-    let solved =
-        |along: &DMatrix<f64>| r.solve_upper_triangular(along).unwrap_or_else(|| DMatrix::zeros(count, along.ncols()));
-    let along = DMatrix::from_columns(&[q.tr_mul(&b)]);
-    let initial_step = (-solved(&along)).iter().copied().collect();
-    b.gemv(-1.0, &q, &along.column(0), 1.0);
-    let along = q.tr_mul(&jacobian);
-    let initial_by_parameter = solved(&along);
-    jacobian.gemm(-1.0, &q, &along, 1.0);
-    Piece { residual: b, jacobian, initial_step, initial_by_parameter, objective, initial_basis: q }
+    let mut jacobian = DMatrix::from_vec(rows + count, derivatives.len(), below);
+    let basis = slices(reach.basis());
+    let along = products(&basis, &[b.as_slice()]);
+    let initial_step = (-reach.solved(&along)).iter().copied().collect();
+    take_out(&mut [b.as_mut_slice()], &basis, &along);
+    let along = products(&basis, &slices(&jacobian));
+    let initial_by_parameter = reach.solved(&along);
+    take_out(&mut jacobian.as_mut_slice().chunks_mut((rows + count).max(1)).collect::<Vec<_>>(), &basis, &along);
+    Piece { residual: b, jacobian, initial_step, initial_by_parameter, objective, initial_basis: reach.into_basis() }
 }
