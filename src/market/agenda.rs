@@ -88,6 +88,18 @@ impl Agenda {
         }
     }
 
+    /// So many things were due, one after the other with nothing between, and have happened.
+    #[inline]
+    pub fn passed(&mut self, count: u64) {
+        self.entries += count;
+    }
+
+    /// Whether nothing is due.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.first.is_none()
+    }
+
     /// When the next is due, and in which phase.
     #[inline]
     pub fn peek(&self) -> Option<(Timestamp, Phase)> {

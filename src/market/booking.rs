@@ -55,12 +55,7 @@ impl Session {
             What::Filled(filled) => {
                 self.charge_held(instrument, at)?;
                 self.book(k, &outcome, &filled)?;
-                let terms = self.mail.terms(place);
-                let (one, quantity) = (self.worth_of_one(instrument), filled.quantity.to_f64());
-                for (mechanism, term) in self.venue.conceding.iter().zip(terms) {
-                    *self.blotter.concessions.entry(mechanism).or_default() += term * quantity * one;
-                }
-                self.blotter.terms.extend_from_slice(terms);
+                self.concede(place, instrument, filled.quantity);
                 let order = &self.blotter.orders[k];
                 let left = order.quantity - order.filled;
                 News::Filled { quantity: filled.quantity, price: filled.price, role: filled.role, left }
@@ -84,8 +79,18 @@ impl Session {
         Ok(Some(Notice { order_id: id, instrument, side, at, news }))
     }
 
+    /// Books what mechanisms added to the price of a fill, whose terms are at a place of the mail.
+    pub(super) fn concede(&mut self, place: usize, instrument: usize, quantity: Quantity) {
+        let terms = self.mail.terms(place);
+        let (one, quantity) = (self.worth_of_one(instrument), quantity.to_f64());
+        for (mechanism, term) in self.venue.conceding.iter().zip(terms) {
+            *self.blotter.concessions.entry(mechanism).or_default() += term * quantity * one;
+        }
+        self.blotter.terms.extend_from_slice(terms);
+    }
+
     /// Books a fill of order `k`.
-    fn book(&mut self, k: usize, outcome: &Outcome, filled: &Filled) -> Result<(), BacktestError> {
+    pub(super) fn book(&mut self, k: usize, outcome: &Outcome, filled: &Filled) -> Result<(), BacktestError> {
         let Outcome { id, instrument, at, .. } = *outcome;
         let rate = self.rate_of(self.ledger.positions()[instrument].currency);
         let order = &mut self.blotter.orders[k];

@@ -37,7 +37,7 @@ impl Session {
     }
 
     /// The price at decision of an order that may be sent, or why it may not.
-    fn admit(&self, id: OrderId, ticket: &Ticket, now: Timestamp, equity: f64) -> Result<Price, Reason> {
+    pub(super) fn admit(&self, id: OrderId, ticket: &Ticket, now: Timestamp, equity: f64) -> Result<Price, Reason> {
         let increments = self.setup.increments.get(ticket.instrument).ok_or(Reason::UnknownInstrument)?;
         if ticket.quantity <= Quantity::ZERO {
             return Err(Reason::NoQuantity);
@@ -97,23 +97,7 @@ impl Session {
 
     pub(super) fn send(&mut self, id: OrderId, ticket: &Ticket, now: Timestamp, price: Price, sender: Sender) {
         let Ticket { instrument, side, quantity, kind, time_in_force, condition, link } = *ticket;
-        let (about, daily) = (&self.setup.instruments[instrument], &self.daily[instrument]);
-        let mid = price.to_f64();
-        let decided = InFlight {
-            side,
-            role: Role::Taker,
-            quantity: quantity.to_f64(),
-            decided_at: now,
-            arrives_at: now,
-            seen_until: now,
-            assumed: mid,
-            mid,
-            participation_limit: f64::INFINITY,
-            multiplier: self.ledger.terms()[instrument].multiplier.get() as f64,
-            average_daily_volume: about.average_daily_volume.or_else(|| daily.volume()),
-            daily_volatility: about.daily_volatility.or_else(|| daily.volatility()),
-            recent_volatility: daily.recent_volatility(),
-        };
+        let decided = self.decided(ticket, now, price);
         // Laws of commands say when it arrives and how much of a volume it may be; its quantity is its owner's.
         let shaped = self.venue.floors[instrument].shape(&decided);
         let order = shaped.arriving(match sender {
@@ -123,32 +107,10 @@ impl Session {
         });
         let child = matches!(link, Link::ChildOf { .. });
         let resting = Resting::new(id, ticket, order, quantity);
-        let known = &mut self.known[instrument];
-        let quote = known.quotes.newest(1).last();
-        let (seen_bid, seen_ask) = match &known.book {
-            Some(book) => [Side::Buy, Side::Sell].map(|side| book.best(side).map(Price::to_f64)).into(),
-            None => (quote.and_then(|quote| quote.bid()), quote.and_then(|quote| quote.ask())),
-        };
         // What the broker closes is as good as closed, and nothing is to be done about it.
         let closes = sender == Sender::Strategy && (child || condition == Condition::ReduceOnly);
-        known.opened(OpenOrder { id, side, kind, left: quantity, closes });
-        self.blotter.orders.push(Order {
-            order_id: id.0,
-            sender,
-            instrument,
-            decided_at: now,
-            arrives_at: order.arrives_at,
-            kind,
-            time_in_force,
-            side,
-            quantity,
-            decision_price: price,
-            seen_bid,
-            seen_ask,
-            status: Status::Unfilled,
-            reason: None,
-            filled: Quantity::ZERO,
-        });
+        self.known[instrument].opened(OpenOrder { id, side, kind, left: quantity, closes });
+        self.enter(id, ticket, now, order.arrives_at, price, sender);
         self.sent.insert(id, (instrument, resting));
         if !child {
             self.agenda.put(order.arrives_at, phase(now, order.arrives_at), Due::Arrive(id));
@@ -162,6 +124,64 @@ impl Session {
             }
             _ => {}
         }
+    }
+
+    /// An order as it is decided, before any law has shaped it.
+    pub(super) fn decided(&self, ticket: &Ticket, now: Timestamp, price: Price) -> InFlight {
+        let Ticket { instrument, side, quantity, .. } = *ticket;
+        let (about, daily) = (&self.setup.instruments[instrument], &self.daily[instrument]);
+        let mid = price.to_f64();
+        InFlight {
+            side,
+            role: Role::Taker,
+            quantity: quantity.to_f64(),
+            decided_at: now,
+            arrives_at: now,
+            seen_until: now,
+            assumed: mid,
+            mid,
+            participation_limit: f64::INFINITY,
+            multiplier: self.ledger.terms()[instrument].multiplier.get() as f64,
+            average_daily_volume: about.average_daily_volume.or_else(|| daily.volume()),
+            daily_volatility: about.daily_volatility.or_else(|| daily.volatility()),
+            recent_volatility: daily.recent_volatility(),
+        }
+    }
+
+    /// Enters an order that is sent in the blotter.
+    pub(super) fn enter(
+        &mut self,
+        id: OrderId,
+        ticket: &Ticket,
+        now: Timestamp,
+        arrives_at: Timestamp,
+        price: Price,
+        sender: Sender,
+    ) {
+        let Ticket { instrument, side, quantity, kind, time_in_force, .. } = *ticket;
+        let known = &self.known[instrument];
+        let quote = known.quotes.newest(1).last();
+        let (seen_bid, seen_ask) = match &known.book {
+            Some(book) => [Side::Buy, Side::Sell].map(|side| book.best(side).map(Price::to_f64)).into(),
+            None => (quote.and_then(|quote| quote.bid()), quote.and_then(|quote| quote.ask())),
+        };
+        self.blotter.orders.push(Order {
+            order_id: id.0,
+            sender,
+            instrument,
+            decided_at: now,
+            arrives_at,
+            kind,
+            time_in_force,
+            side,
+            quantity,
+            decision_price: price,
+            seen_bid,
+            seen_ask,
+            status: Status::Unfilled,
+            reason: None,
+            filled: Quantity::ZERO,
+        });
     }
 
     /// Sends a message about an order.

@@ -52,6 +52,8 @@ pub(super) struct BarsAlone<'f> {
     pub bars: &'f Arc<Vec<Bar>>,
     /// Those of them that come before more must be read.
     pub next: Range<usize>,
+    /// The row of the first of these.
+    pub row: usize,
     /// When other data come between.
     pub end: Timestamp,
 }
@@ -169,7 +171,7 @@ impl Feed {
             node /= 2;
         }
         let from = next - first;
-        Some(BarsAlone { instrument, bars, next: from..to.max(from), end })
+        Some(BarsAlone { instrument, bars, next: from..to.max(from), row: next, end })
     }
 
     /// The first `count` of [these bars](Self::bars_alone) are over.

@@ -21,12 +21,25 @@ impl Mail {
 
     /// Puts an outcome on its way, and gives its place; what is no fill has no terms.
     pub fn put(&mut self, outcome: Outcome, terms: &[f64]) -> usize {
+        let place = self.place(terms);
+        self.slots[place] = Some(outcome);
+        place
+    }
+
+    /// A fill of these terms is known as soon as it was made: it leaves the place that it would have had, as [taken](Self::take).
+    pub fn pass(&mut self, terms: &[f64]) -> usize {
+        let place = self.place(terms);
+        self.free.push(place);
+        place
+    }
+
+    /// A place that is free, with these terms.
+    fn place(&mut self, terms: &[f64]) -> usize {
         let place = self.free.pop().unwrap_or_else(|| {
             self.slots.push(None);
             self.terms.resize(self.terms.len() + self.count, 0.0);
             self.slots.len() - 1
         });
-        self.slots[place] = Some(outcome);
         let own = &mut self.terms[place * self.count..(place + 1) * self.count];
         own[..terms.len()].copy_from_slice(terms);
         place

@@ -28,6 +28,7 @@ use super::{Arrival, Daily, DataSeen, DepthBook, Event, EventKind, Feed, Ledger,
 mod clocked;
 mod exchange;
 mod outside;
+mod plain;
 mod quiet;
 mod telling;
 
@@ -42,6 +43,8 @@ pub struct Session {
     direct: bool,
     /// Nothing but bars and orders wants to be looked for.
     can_be_quiet: bool,
+    /// Market orders may meet the next open with nothing between.
+    can_be_plain: bool,
     pub(super) agenda: Agenda,
     pub(super) clocks: Clocks,
     pub(super) timetable: Timetable,
@@ -155,6 +158,7 @@ impl Session {
             agenda,
             direct: latencies.feed.is_none() && stale == 0.0 && !late,
             can_be_quiet: false,
+            can_be_plain: false,
             clocks: Clocks::new(latencies, stale, seed),
             timetable,
             known,
@@ -175,6 +179,7 @@ impl Session {
             rows: 0,
         };
         session.can_be_quiet = session.may_be_quiet();
+        session.can_be_plain = session.may_be_plain();
         session
     }
 
@@ -212,6 +217,7 @@ impl Session {
             trades_mark: self.trades_mark.clone(),
             direct: self.direct,
             can_be_quiet: self.can_be_quiet,
+            can_be_plain: self.can_be_plain,
             agenda: self.agenda.clone(),
             clocks: self.clocks.clone(),
             timetable: self.timetable.clone(),

@@ -17,6 +17,7 @@ mod displayed;
 mod floor;
 mod moved;
 mod path;
+mod plain;
 mod queue;
 mod resting;
 mod shown;

@@ -77,6 +77,12 @@ impl<P: Plant> Run<P> {
         self.controller.as_ref().is_some_and(|controller| controller.due(time))
     }
 
+    /// Whether commands arrive as they were sent, at once.
+    #[must_use]
+    pub fn leaves_commands(&self) -> bool {
+        self.controller.is_none() && self.command_laws.is_empty()
+    }
+
     /// Shapes the commands on their way.
     fn shape(&mut self, tick: Tick) -> &mut [P::Command] {
         for law in &mut self.command_laws {

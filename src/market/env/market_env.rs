@@ -169,6 +169,12 @@ impl<T: Task> MarketEnv<T> {
         Some(self.course.as_ref()?.session.fork()?.finish())
     }
 
+    /// The session of the episode under way.
+    #[cfg(test)]
+    pub(super) fn session_mut(&mut self) -> Option<&mut Session> {
+        self.course.as_mut().map(|course| &mut course.session)
+    }
+
     /// Events of the episode so far.
     #[must_use]
     pub fn events(&self) -> usize {
@@ -266,7 +272,8 @@ impl Course {
         own: usize,
         observation: &mut [f32],
     ) -> Result<Step, BacktestError> {
-        self.session.tell(self.event, |view, orders| driver.act(view, orders, action))?;
+        let equity = self.session.hear(self.event, |view, orders| driver.act(view, orders, action))?;
+        self.session.send_on(self.event.time, equity, driver)?;
         let mut ended = false;
         loop {
             match self.session.step(driver)? {

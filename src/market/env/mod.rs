@@ -16,6 +16,8 @@ mod generate;
 mod make_market;
 mod market_env;
 mod pace;
+#[cfg(test)]
+mod plain_tests;
 mod portfolio;
 mod registry;
 mod reward;

@@ -43,7 +43,7 @@ impl Session {
     /// Shows the strategy the bars of a quiet stretch, up to the first after which something is due.
     #[inline]
     fn pass_quiet_bars(&mut self, strategy: &mut dyn Strategy, last: usize) -> Result<(), BacktestError> {
-        let Some(BarsAlone { instrument, bars, next, end: others }) = self.feed.bars_alone() else { return Ok(()) };
+        let Some(BarsAlone { instrument, bars, next, end: others, .. }) = self.feed.bars_alone() else { return Ok(()) };
         if next.is_empty() {
             return Ok(());
         }
@@ -57,12 +57,15 @@ impl Session {
         // What is held is charged at the first event of a day.
         let day = if self.venue.charges.is_empty() { Timestamp::MAX } else { self.carry.next };
         let (end, most) = (others.min(due).min(shown).min(day), last.saturating_sub(self.held.events));
-        let (mut passed, mut shown) = (0, Ok(()));
+        let (mut passed, mut shown) = (0, Ok(None));
         for bar in bars[next].iter().take(most).take_while(|bar| bar.known_at < end) {
             passed += 1;
             match self.show_bar(instrument, bar, strategy) {
-                Ok(false) => {}
-                Ok(true) => break,
+                Ok(None) => {}
+                Ok(Some(equity)) => {
+                    shown = Ok(Some((bar.known_at, equity)));
+                    break;
+                }
                 Err(error) => {
                     shown = Err(error);
                     break;
@@ -73,6 +76,12 @@ impl Session {
             self.rows += passed;
             self.feed.skip_bars(passed);
         }
-        shown
+        match shown? {
+            // Whoever lets it advance looks at it after the last event.
+            Some((now, equity)) if self.held.events < last => self.send_on(now, equity, strategy)?,
+            Some((now, equity)) => self.send_all(now, equity),
+            None => {}
+        }
+        Ok(())
     }
 }

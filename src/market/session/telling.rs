@@ -41,14 +41,15 @@ impl Session {
         Ok(equity)
     }
 
-    /// Shows the strategy a bar, where nothing else wants to be looked for; whether it asked for anything.
+    /// Shows the strategy a bar, where nothing else wants to be looked for; the equity it decided on, if it asked for anything.
+    /// That is not sent yet.
     #[inline(always)]
     pub(super) fn show_bar(
         &mut self,
         instrument: usize,
         bar: &Bar,
         strategy: &mut dyn Strategy,
-    ) -> Result<bool, BacktestError> {
+    ) -> Result<Option<Cash>, BacktestError> {
         let event = Event { time: bar.known_at, instrument, kind: EventKind::Bar };
         let known = &mut self.known[instrument];
         known.keep = strategy.lookback().max(1);
@@ -57,11 +58,7 @@ impl Session {
         self.daily[instrument].see(event.time, bar.close, bar.volume);
         self.ledger.mark(instrument, bar.close).map_err(|error| self.money(event, error))?;
         let equity = self.ask(event, strategy)?;
-        let asks = !self.orders.requests().is_empty();
-        if asks {
-            self.send_all(event.time, equity);
-        }
-        Ok(asks)
+        Ok(if self.orders.requests().is_empty() { None } else { Some(equity) })
     }
 
     #[inline(always)]
@@ -163,10 +160,21 @@ impl Session {
         event: Event,
         hears: impl FnOnce(&View<'_>, &mut Orders),
     ) -> Result<(), BacktestError> {
+        let equity = self.hear(event, hears)?;
+        self.send_asked(event.time, equity);
+        Ok(())
+    }
+
+    /// The same, but that what it asks for is not sent yet: the equity it decided on.
+    #[inline(always)]
+    pub(in crate::market) fn hear(
+        &mut self,
+        event: Event,
+        hears: impl FnOnce(&View<'_>, &mut Orders),
+    ) -> Result<Cash, BacktestError> {
         let equity = self.ledger.equity().map_err(|error| self.money(event, error))?;
         let (view, orders) = self.view(event, equity);
         hears(&view, orders);
-        self.send_asked(event.time, equity);
-        Ok(())
+        Ok(equity)
     }
 }

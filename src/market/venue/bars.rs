@@ -248,7 +248,7 @@ impl Floor {
         }
     }
 
-    fn offer(&self, bar: &Bar, at: Timestamp, price: Price) -> Offer {
+    pub(super) fn offer(&self, bar: &Bar, at: Timestamp, price: Price) -> Offer {
         let mid = price.to_f64();
         let book = Book::at_price(at, mid);
         Offer { at, reference: mid, mid, book, volume: bar.volume, row: self.rows[0], band: [bar.low, bar.high] }

@@ -175,11 +175,7 @@ impl Floor {
             return;
         }
         let arriving = InFlight { quantity: wanted.to_f64(), ..self.resting[k].order.as_a(Role::Taker) };
-        let (model_price, filled, quantity, fee) = self.meet(&arriving, offer);
-        // A quantity beyond 2^53 steps does not come back from a float as it went in: what is filled whole is whole.
-        let reported = Quantity::nearest(quantity).unwrap_or(wanted);
-        let quantity =
-            if filled >= 1.0 || reported >= wanted { wanted } else { self.increments.whole_lots(reported).min(wanted) };
+        let (model_price, quantity, fee) = self.met_whole_lots(&arriving, offer, wanted);
         if quantity <= Quantity::ZERO {
             return;
         }
@@ -190,6 +186,15 @@ impl Floor {
             (price, model_price) = (limit, limit.to_f64());
         }
         self.fill(k, Role::Taker, quantity, price, model_price, fee, offer);
+    }
+
+    /// Lets an order for `wanted` meet an offer: price, whole lots filled, and fee.
+    pub(super) fn met_whole_lots(&mut self, arriving: &InFlight, offer: &Offer, wanted: Quantity) -> (f64, Quantity, f64) {
+        let (model_price, filled, quantity, fee) = self.meet(arriving, offer);
+        // A quantity beyond 2^53 steps does not come back from a float as it went in: what is filled whole is whole.
+        let reported = Quantity::nearest(quantity).unwrap_or(wanted);
+        let whole = filled >= 1.0 || reported >= wanted;
+        (model_price, if whole { wanted } else { self.increments.whole_lots(reported).min(wanted) }, fee)
     }
 
     /// Order `k`, which rests, is taken by others: `quantity` of it at its limit.
@@ -231,7 +236,7 @@ impl Floor {
     }
 
     /// A price on a tick; 0 where there is none that could be.
-    fn rounded(&self, side: Side, price: f64) -> Price {
+    pub(super) fn rounded(&self, side: Side, price: f64) -> Price {
         Price::nearest(price).map_or(Price(0), |price| self.fill_increments.against(side, price))
     }
 

@@ -36,6 +36,11 @@ impl Moved {
         Self { laws, ..Self::default() }
     }
 
+    /// Whether no law says so: the market is the recorded one.
+    pub fn is_never(&self) -> bool {
+        self.laws.is_empty()
+    }
+
     /// By how much the market is above the recorded one: whole ticks.
     pub fn by(&self) -> Price {
         self.by
