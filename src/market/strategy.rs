@@ -13,7 +13,10 @@ use super::{
 };
 
 /// What brought an event about; in the order in which they come at one instant.
+// As wide as what stands beside it in an event: padding is copied in pieces, and reading pieces back as a whole takes longer than
+// all else of a copy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u64)]
 pub enum EventKind {
     /// A bar became known.
     Bar,

@@ -83,6 +83,12 @@ impl<P: Plant> Run<P> {
         self.controller.is_none() && self.command_laws.is_empty()
     }
 
+    /// Whether it is the plant and nothing else: no controller, and no law at any site.
+    #[must_use]
+    pub fn is_bare(&self) -> bool {
+        self.leaves_commands() && self.plant_laws.is_empty() && self.observation_laws.is_empty()
+    }
+
     /// Shapes the commands on their way.
     fn shape(&mut self, tick: Tick) -> &mut [P::Command] {
         for law in &mut self.command_laws {

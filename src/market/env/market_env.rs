@@ -238,14 +238,13 @@ impl<T: Task> Env for MarketEnv<T> {
     fn step(&mut self, action: Actions<'_>, observation: &mut [f32]) -> Result<Step, EnvError> {
         let (driver, own) = (&mut self.driver, self.shared.own);
         let Some(course) = &mut self.course else { return Err(EnvError::NotReset { lane: 0 }) };
-        match course.step(driver, action.continuous(), own, observation) {
-            Ok(step) => Ok(step),
-            Err(error) => {
-                // A run that cannot go on has no state to go on from.
-                self.course = None;
-                Err(MarketEnvError::from(error).into())
-            }
+        let mut step = Step::default();
+        if let Err(error) = course.step(driver, action.continuous(), own, observation, &mut step) {
+            // A run that cannot go on has no state to go on from.
+            self.course = None;
+            return Err(MarketEnvError::from(error).into());
         }
+        Ok(step)
     }
 
     fn info(&self, channel: usize) -> f64 {
@@ -271,24 +270,27 @@ impl Course {
         action: &[f32],
         own: usize,
         observation: &mut [f32],
-    ) -> Result<Step, BacktestError> {
-        let equity = self.session.hear(self.event, |view, orders| driver.act(view, orders, action))?;
-        self.session.send_on(self.event.time, equity, driver)?;
+        step: &mut Step,
+    ) -> Result<(), BacktestError> {
+        let mut event = self.event;
+        let equity = self.session.hear(event, |view, orders| driver.act(view, orders, action))?;
+        self.session.send_on(event.time, equity, driver)?;
         let mut ended = false;
         loop {
             match self.session.step(driver)? {
-                Some(event) => self.event = event,
+                Some(next) => event = next,
                 None => ended = true,
             }
             if driver.due || ended {
                 break;
             }
         }
+        self.event = event;
         let over = ended || self.session.is_over();
         let view = self
             .session
-            .seen(self.event)
-            .map_err(|error| BacktestError::Money { place: format!("the account at {}", self.event.time), error })?;
+            .seen(event)
+            .map_err(|error| BacktestError::Money { place: format!("the account at {}", event.time), error })?;
         let blotter = self.session.blotter();
         let task = &mut driver.task;
         let Outcome { reward, done } = if over { task.cut_off(&view, blotter) } else { task.settle(&view, blotter) };
@@ -302,7 +304,8 @@ impl Course {
             () => Ended::No,
         };
         let terminated = matches!(self.ended, Ended::Done | Ended::MarginCall);
-        Ok(Step { reward, terminated, truncated: !terminated && self.ended != Ended::No })
+        *step = Step { reward, terminated, truncated: !terminated && self.ended != Ended::No };
+        Ok(())
     }
 
     /// The value of an info channel that every market environment has.

@@ -8,7 +8,7 @@
 use crate::market::feed::BarsAlone;
 use crate::market::venue::{Floor, Outcome, What};
 use crate::market::{
-    BacktestError, Bar, Cash, Event, EventKind, News, Notice, OrderId, Quantity, Rejection, Request, Sender,
+    BacktestError, Bar, Cash, Event, EventKind, News, Notice, OrderId, Quantity, Rejection, Request, Sender, Side,
 };
 use crate::market::{Strategy, Ticket};
 use crate::sim2real::Timestamp;
@@ -18,7 +18,9 @@ use super::Session;
 /// A plain order, and the bar it meets.
 struct Plain {
     id: OrderId,
-    ticket: Ticket,
+    instrument: usize,
+    side: Side,
+    quantity: Quantity,
     row: usize,
     bar: Bar,
 }
@@ -70,12 +72,14 @@ impl Session {
         if !self.can_be_plain || !self.agenda.is_empty() || self.transit.peek().is_some() {
             return None;
         }
-        let [Request::Submit(id, ticket)] = *self.orders.requests() else { return None };
+        let [Request::Submit(id, ticket)] = self.orders.requests() else { return None };
         let BarsAlone { instrument, bars, next, row, end } = self.feed.bars_alone()?;
         let bar = bars.get(next).and_then(|next| next.first())?;
         let comes_next = instrument == ticket.instrument && now <= bar.open_at && bar.open_at < bar.known_at.min(end);
-        let of_market = ticket == Ticket::market(instrument, ticket.side, ticket.quantity);
-        (comes_next && of_market && self.venue.floors[instrument].is_alone()).then_some(Plain { id, ticket, row, bar: *bar })
+        let (side, quantity) = (ticket.side, ticket.quantity);
+        let of_market = *ticket == Ticket::market(instrument, side, quantity);
+        let plain = comes_next && of_market && self.venue.floors[instrument].is_alone();
+        plain.then_some(Plain { id: *id, instrument, side, quantity, row, bar: *bar })
     }
 
     /// A plain order is sent, filled and booked, and word of it told.
@@ -87,32 +91,34 @@ impl Session {
         equity: Cash,
         strategy: &mut dyn Strategy,
     ) -> Result<(), BacktestError> {
-        let Plain { id, ticket, row, bar } = plain;
-        let Ticket { instrument, side, quantity, .. } = *ticket;
+        let Plain { id, instrument, side, quantity, row, bar } = *plain;
+        let ticket = &Ticket::market(instrument, side, quantity);
         self.orders.clear();
-        let price = match self.admit(*id, ticket, now, equity.to_f64()) {
+        let price = match self.admit(id, ticket, now, equity.to_f64()) {
             Ok(price) => price,
             Err(reason) => {
                 self.blotter.reject(Rejection { decided_at: now, instrument, side, quantity, reason });
                 return Ok(());
             }
         };
-        let order = self.decided(ticket, now, price);
-        self.enter(*id, ticket, now, now, price, Sender::Strategy);
-        self.expected[instrument] = Some(*row);
+        let decided = (!self.venue.floors[instrument].is_bare()).then(|| self.decided(ticket, now, price));
+        self.enter(id, ticket, now, now, price, Sender::Strategy);
+        self.expected[instrument] = Some(row);
         // Its arrival and the open.
         self.agenda.passed(2);
         let floor = &mut self.venue.floors[instrument];
-        let Some(filled) = floor.meet_open(*id, &order, quantity, bar, *row) else { return self.settle(instrument) };
+        let Some(filled) = floor.meet_open(id, side, quantity, &bar, row, decided.as_ref()) else {
+            return self.settle(instrument);
+        };
         // Word of it.
         self.agenda.passed(1);
         let place = self.mail.pass(floor.concessions());
         let (at, last) = (bar.open_at, self.blotter.orders.len() - 1);
         self.charge_held(instrument, at)?;
-        self.book(last, &Outcome { id: *id, instrument, at, what: What::Filled(filled) }, &filled)?;
+        self.book(last, &Outcome { id, instrument, at, what: What::Filled(filled) }, &filled)?;
         self.concede(place, instrument, filled.quantity);
         let news = News::Filled { quantity, price: filled.price, role: filled.role, left: Quantity::ZERO };
-        let notice = Notice { order_id: *id, instrument, side, at, news };
+        let notice = Notice { order_id: id, instrument, side, at, news };
         let event = Event { time: at, instrument, kind: EventKind::Timer };
         self.tell(event, |view, orders| strategy.on_notice(view, &notice, orders))
     }

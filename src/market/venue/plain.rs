@@ -1,6 +1,6 @@
 //! A market order that meets the next open alone.
 
-use crate::market::{Bar, InFlight, OrderId, Price, Quantity, Reason, Role};
+use crate::market::{Bar, InFlight, OrderId, Price, Quantity, Reason, Role, Side};
 
 use super::floor::Floor;
 use super::taken::Taken;
@@ -19,24 +19,47 @@ impl Floor {
         self.resting.is_empty() && self.outcomes.is_empty() && self.instead.is_empty()
     }
 
+    /// Whether no law has anything to say here.
+    pub fn is_bare(&self) -> bool {
+        self.run.is_bare()
+    }
+
     /// A market order for `quantity`, whole lots, arrives where [nobody waits](Self::is_alone) and meets the open of `bar`, the next:
     /// what [`arrive`](Self::arrive) and [`on_open`](Self::on_open) make of it, in one. Where it is filled whole, its fill; else what
-    /// became of it is among the outcomes, as ever.
-    pub fn meet_open(&mut self, id: OrderId, order: &InFlight, quantity: Quantity, bar: &Bar, row: usize) -> Option<Filled> {
+    /// became of it is among the outcomes, as ever. How it was `decided` need not be known where [no law](Self::is_bare) asks.
+    #[inline]
+    pub fn meet_open(
+        &mut self,
+        id: OrderId,
+        side: Side,
+        quantity: Quantity,
+        bar: &Bar,
+        row: usize,
+        decided: Option<&InFlight>,
+    ) -> Option<Filled> {
         // The message by which it was sent, which no law shapes.
         self.messages += 1;
         self.at_row(0, row);
         self.taken = Taken::of_bars();
         let offer = self.offer(bar, bar.open_at, bar.open);
-        let arriving = InFlight { quantity: quantity.to_f64(), ..order.as_a(Role::Taker) };
-        let (model_price, met, fee) = self.met_whole_lots(&arriving, &offer, quantity);
+        let (model_price, met, fee) = match decided {
+            Some(order) => {
+                let arriving = InFlight { quantity: quantity.to_f64(), ..order.as_a(Role::Taker) };
+                self.met_whole_lots(&arriving, &offer, quantity)
+            }
+            None => {
+                // Nothing limits it, moves its price or charges it.
+                self.messages += 1;
+                (offer.reference, quantity, 0.0)
+            }
+        };
         let filled = (met > Quantity::ZERO).then(|| {
-            self.taken.add(order.side, met.to_f64());
-            self.held = self.held + met.signed(order.side);
+            self.taken.add(side, met.to_f64());
+            self.held = self.held + met.signed(side);
             Filled {
                 role: Role::Taker,
                 quantity: met,
-                price: self.rounded(order.side, model_price),
+                price: self.rounded(side, model_price),
                 model_price,
                 mid: offer.mid,
                 fee,
