@@ -64,7 +64,8 @@ impl Spread {
         let (a, b) = ((low - self.mean) / self.std, (high - self.mean) / self.std);
         let normal = Normal::standard();
         if b - a < FLAT {
-            let width = (b - a).max(FLAT * FINEST);
+            // What is known exactly is known to a width of its own, however wide the distribution is.
+            let width = (high - low).max(FLAT * FINEST) / self.std;
             return Inside {
                 mean: 0.5 * (low + high),
                 variance: (high - low).powi(2) / 12.0,
@@ -112,6 +113,15 @@ mod tests {
         let spread = Spread::fit(&known, None).unwrap();
         assert!((spread.mean - 2.0).abs() < 1e-9 && (spread.std - 0.5).abs() < 0.005, "{spread:?}");
         assert_eq!(Spread::fit(&[], None), None);
+    }
+
+    #[test]
+    fn the_likelihood_of_known_values_is_that_of_their_spreads() {
+        // Of n values the spread about another mean is wider, and n ln(wider / narrower) is how much less likely that makes them.
+        let known: Vec<Bounds> = values().iter().map(|value| (*value, *value)).collect();
+        let [own, held] = [None, Some(1.0)].map(|mean| Spread::fit(&known, mean).unwrap());
+        let expected = 200.0 * (held.std / own.std).ln();
+        assert!((own.log_likelihood - held.log_likelihood - expected).abs() < 1e-6 * expected, "{own:?} {held:?}");
     }
 
     #[test]

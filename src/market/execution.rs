@@ -244,6 +244,10 @@ impl Plant for Execution {
             quantum: recordings.iter().filter_map(|recording| recording.stimulus.quantum()).reduce(f64::min),
             delay: median(delays().filter_map(ShownDelay::constant).collect()),
             delays: usual(delays().map(ShownDelay::estimate)),
+            duration: recordings
+                .iter()
+                .filter_map(|recording| Some(recording.time.last()? - recording.time.first()?))
+                .fold(0.0, f64::max),
             age: median(recordings.iter().filter_map(|recording| recording.stimulus.shown_age()).collect()),
             ..Typical::default()
         }

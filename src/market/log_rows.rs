@@ -5,7 +5,9 @@ use std::borrow::Cow;
 use crate::sim2real::Timestamp;
 
 use super::recent;
-use super::{InFlight, LogError, LogMarket, LogTable, LoggedFill, LoggedOrder, OrderType, Piece, Role, Seen, Tape};
+use super::{
+    InFlight, LogError, LogMarket, LogTable, LoggedFill, LoggedOrder, OrderType, Piece, Role, Seen, Tape, own_print,
+};
 
 /// The largest part of a log that may be left out because the tape does not tell of it.
 const LEFT_OUT: f64 = 0.01;
@@ -98,6 +100,50 @@ impl<'a> Stamps<'a> {
         let fills = fills.iter().map(|fill| LoggedFill { filled_at: later(fill.filled_at), ..fill.clone() });
         Self { orders: orders.collect(), fills: fills.collect(), early }
     }
+}
+
+/// So many standard errors of the usual delay are chance.
+const CHANCE: f64 = 3.0;
+
+/// `orders` whose stamps were cut, so that they are off by up to `rounding` [ns] either way: where the tape shows their own trades, the
+/// usual delay before these, as far as the stamps allow. What an order does itself to the market would else pass for what its
+/// decision was based on, and what the market does until the order is there for a delay.
+///
+/// A second has no preferred part to decide in: own trades are half a second after the stamps on average, and a delay later.
+pub(super) fn before_own_trades<'a>(
+    orders: &'a [LoggedOrder],
+    fills: &[Vec<&LoggedFill>],
+    tape: &Tape,
+    rounding: i64,
+) -> Cow<'a, [LoggedOrder]> {
+    if rounding == 0 {
+        return Cow::Borrowed(orders);
+    }
+    let own = |(order, fills): (&LoggedOrder, &Vec<&LoggedFill>)| {
+        let pieces: Vec<Piece> = fills.iter().map(|f| Piece { quantity: f.quantity, price: f.price }).collect();
+        let reported = Timestamp(fills.first()?.filled_at.0 + rounding);
+        own_print(tape.prints(), order.side, Timestamp(order.decided_at.0 - rounding - 1), reported, &pieces)
+    };
+    let own: Vec<Option<Timestamp>> = orders.iter().zip(fills).map(own).collect();
+    let late = orders.iter().zip(&own).filter_map(|(order, own)| Some((*own)?.0 - order.decided_at.0));
+    let delay = usual_delay(late.collect(), rounding);
+    let before = |(order, own): (&LoggedOrder, &Option<Timestamp>)| {
+        let middle = order.decided_at.0;
+        let within = |at: i64| at.clamp(middle - rounding, middle + rounding - 1);
+        let decided = own.map_or(middle, |own| within(own.0 - delay - 1));
+        LoggedOrder { decided_at: Timestamp(decided), ..order.clone() }
+    };
+    orders.iter().zip(&own).map(before).collect()
+}
+
+/// The usual delay [ns] of orders that traded so much [ns] `late`r than the middles of the stretches of `rounding` either way in which
+/// they were decided; none where the middles alone may be as far off.
+fn usual_delay(mut late: Vec<i64>, rounding: i64) -> i64 {
+    late.sort_unstable();
+    let Some(median) = late.get(late.len() / 2) else { return 0 };
+    // That of the median of as many numbers which are evenly distributed over the stretch.
+    let error = rounding as f64 / (late.len() as f64).sqrt();
+    if *median as f64 > CHANCE * error { *median } else { 0 }
 }
 
 /// A fill of an order that rested.
@@ -272,4 +318,69 @@ fn outside_hint(seconds: f64) -> String {
         return "are times in another unit than nanoseconds? Declare `time_unit`".to_owned();
     }
     "do orders and tape come from the same days?".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::market::{Print, Quotes, Side};
+
+    const HALF: i64 = Timestamp::NANOS / 2;
+
+    fn at(seconds: f64) -> Timestamp {
+        Timestamp(1_000 * Timestamp::NANOS).plus_seconds(seconds)
+    }
+
+    /// When orders are taken to be decided, which bought so much at so many seconds, or are not on the tape, and whose stamps were cut.
+    fn decided(bought: &[(f64, f64, bool)], rounding: i64) -> Vec<Timestamp> {
+        let print = |(seconds, size, _): &(f64, f64, bool)| Print {
+            time: at(*seconds),
+            price: 50.0,
+            size: *size,
+            aggressor: Some(Side::Buy),
+        };
+        let prints = bought.iter().filter(|(.., shown)| *shown).map(print).collect();
+        let tape = Tape::new(Quotes::with_depth(1), prints, Vec::new());
+        let stamp = |seconds: f64| at(seconds.floor() + 0.5);
+        let order = |(row, (seconds, quantity, _)): (usize, &(f64, f64, bool))| LoggedOrder {
+            id: row.to_string(),
+            side: Side::Buy,
+            quantity: *quantity,
+            decided_at: stamp(*seconds),
+            kind: OrderType::Market,
+            seen_mid: None,
+        };
+        let orders: Vec<LoggedOrder> = bought.iter().enumerate().map(order).collect();
+        let fills: Vec<LoggedFill> = orders
+            .iter()
+            .map(|o| LoggedFill {
+                order_id: o.id.clone(),
+                filled_at: o.decided_at,
+                quantity: o.quantity,
+                price: 50.0,
+                fee: 0.0,
+            })
+            .collect();
+        let of_order: Vec<Vec<&LoggedFill>> = fills.iter().map(|fill| vec![fill]).collect();
+        before_own_trades(&orders, &of_order, &tape, rounding).iter().map(|order| order.decided_at).collect()
+    }
+
+    #[test]
+    fn an_order_whose_stamp_was_cut_was_decided_before_its_own_trade() {
+        // One before the middle of the second, which stamps are taken for, one after it, and one that the tape does not show.
+        let bought = [(0.2, 7.0, true), (0.8, 9.0, true), (0.9, 11.0, false)];
+        assert_eq!(decided(&bought, HALF), [Timestamp(at(0.2).0 - 1), Timestamp(at(0.8).0 - 1), at(0.5)]);
+        assert_eq!(decided(&bought, 0), [at(0.5); 3], "what was not cut is known");
+    }
+
+    #[test]
+    fn orders_that_traded_late_on_average_took_their_time() {
+        let seconds = |number: f64| number / 100.0 * Timestamp::NANOS as f64;
+        let spread = |delay: f64| (0..100).map(|k| seconds(f64::from(k) - 49.5 + delay) as i64).collect::<Vec<_>>();
+        assert_eq!(usual_delay(spread(2.0), HALF), 0, "as late may be chance");
+        assert_eq!(usual_delay(spread(-30.0), HALF), 0, "none trades before it was decided");
+        let usual = usual_delay(spread(40.0), HALF);
+        assert!((usual - seconds(40.0) as i64).abs() <= seconds(1.0) as i64, "{usual}");
+        assert_eq!(usual_delay(Vec::new(), HALF), 0);
+    }
 }

@@ -161,12 +161,14 @@ fn answered(orders: &[(Timestamp, Traded)]) -> Vec<Option<Answered>> {
     orders.iter().map(one).collect()
 }
 
-/// The step to which reports are rounded [ns]: a second, a millisecond, or not at all.
+/// The step to which reports are rounded [ns]: a second, a millisecond, or not at all. The tape tells more exactly when those were
+/// decided whose trades it shows.
 fn rounding(orders: &[(Timestamp, Traded)]) -> i64 {
     let stamps = || {
-        orders.iter().map(|(decided, traded)| match traded {
-            Traded::Report(at) => *at,
-            Traded::Print(_) | Traded::No => *decided,
+        orders.iter().filter_map(|(decided, traded)| match traded {
+            Traded::Report(at) => Some(*at),
+            Traded::No => Some(*decided),
+            Traded::Print(_) => None,
         })
     };
     let whole = |step: i64| stamps().all(|at| at.0 % step == 0);

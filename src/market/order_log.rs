@@ -8,7 +8,7 @@ use aspects::Aspect;
 
 use super::log_clock::Clocked;
 use super::log_entry::fills_of_orders;
-use super::log_rows::{Made, Outcome, Stamps, made, market_orders, on_tape};
+use super::log_rows::{Made, Outcome, Stamps, before_own_trades, made, market_orders, on_tape};
 use super::look::{Look, Traded, looks, market_came, shows_own};
 use super::met_by_report::{met_at, met_by_report};
 use super::quantum::quantum;
@@ -118,6 +118,7 @@ impl OrderLog {
         let Clocked { orders, fills } = Clocked::of(orders, fills, &of_order, &market.tape, early, &mut notes);
         let (orders, fills) = (orders.as_ref(), fills.as_ref());
         let of_order = fills_of_orders(orders, fills)?;
+        let orders = &*before_own_trades(orders, &of_order, &market.tape, early);
         let own: Vec<Timestamp> = fills.iter().map(|fill| fill.filled_at).collect();
         let mut made = made(orders, &of_order, &market.tape);
         let places = Places::of(orders, &of_order, &market.tape, early);
@@ -129,7 +130,10 @@ impl OrderLog {
         let own_prints: Vec<Option<Timestamp>> = in_flight
             .iter()
             .zip(&executions)
-            .map(|(o, e)| own_print(market.tape.prints(), o.side, o.decided_at, e.first_fill?, &e.pieces))
+            .map(|(o, e)| {
+                let reported = Timestamp(e.first_fill?.0 + early);
+                own_print(market.tape.prints(), o.side, o.decided_at, reported, &e.pieces)
+            })
             .collect();
         let tick_size = market.instrument.tick_size;
         let told = || met_by_report(&market.tape, market.price, tick_size, &in_flight, &executions).filter(|_| !cut);

@@ -235,6 +235,30 @@ mod tests {
             assert_eq!(known, Some((50.0, f64::INFINITY)), "{ask}");
         }
     }
+
+    /// What each of `filled` tells of an order that was filled in part of the 60 that were sold at its price, where 40 were displayed.
+    fn told(filled: &[f64]) -> Places {
+        let fills: Vec<LoggedFill> = filled_parts(filled);
+        let of_order: Vec<Vec<&LoggedFill>> = fills.iter().map(|fill| vec![fill]).collect();
+        Places::of(&vec![order(); fills.len()], &of_order, &tape(&CALM, &[(2.0, 20.0), (3.0, 40.0)]), 0)
+    }
+
+    fn filled_parts(quantities: &[f64]) -> Vec<LoggedFill> {
+        quantities.iter().map(|quantity| filled(3.0, *quantity)).collect()
+    }
+
+    #[test]
+    fn a_few_places_that_are_known_exactly_tell_that_more_stood_ahead() {
+        // 56 to 40 stood ahead of them.
+        let places = told(&[4.0, 8.0, 9.0, 11.0, 13.0, 15.0, 16.0, 20.0]);
+        let Places::Late(places) = &places else { panic!("{places:?}") };
+        assert_eq!(places.len(), 8);
+        let mean = places.iter().map(|place| place.beyond).sum::<f64>() / 8.0;
+        assert!((mean - 0.2).abs() < 1e-9 && places.iter().all(|place| place.displayed == 40.0), "{places:?}");
+        // 48 to 32: on average as many as were displayed.
+        assert_eq!(told(&[12.0, 16.0, 17.0, 19.0, 21.0, 23.0, 24.0, 28.0]), Places::Silent);
+    }
+
     #[test]
     fn that_places_are_not_known_is_said_where_many_orders_were_filled() {
         let tape = tape(&[(0.0, 100.01), (2.5, 100.0), (20.0, 100.0)], &[]);

@@ -73,6 +73,23 @@ impl Mechanism<Execution> for TransientImpact {
         ]
     }
 
+    /// What hardly fades while it is recorded is told from what stays by the forms of both alone, and no form is that exact: a decay
+    /// is one of which the recordings show the end.
+    fn sought(&self, typical: &Typical) -> Vec<Form> {
+        let mut forms = self.forms(typical);
+        if typical.duration > 0.0 {
+            for parameter in forms.iter_mut().flat_map(|form| &mut form.parameters) {
+                match parameter.name.as_ref() {
+                    "recovery" => shortened(parameter, RECOVERED * typical.duration),
+                    "lag" => shortened(parameter, BEGUN * typical.duration),
+                    "exponent" => parameter.lower = SLOWEST,
+                    _ => {}
+                }
+            }
+        }
+        forms
+    }
+
     /// Where the tape shows own orders, looks at the mid tell of it; where it does not, what later orders pay.
     fn applies(&self, form: usize, _plant: &Execution, log: &OrderLog) -> bool {
         let told = if form >= SHOWN { log.looks() > 0 } else { true };
@@ -97,6 +114,22 @@ impl Mechanism<Execution> for TransientImpact {
 impl Demanding for TransientImpact {
     fn needs(&self, _form: usize) -> &'static [Need] {
         &[Need::DailyVolume]
+    }
+}
+
+/// Within this part of a recording a displacement falls to 1 / e: on average orders have as much of it behind them.
+const RECOVERED: f64 = 0.5;
+/// Within this part a power law begins to fall, ...
+const BEGUN: f64 = 0.01;
+/// ... and no slower than this: exponents of 0.2 and more are what was found (Bouchaud et al. 2004).
+const SLOWEST: f64 = 0.2;
+
+/// Bounds a time by `longest` [s], with a start within it.
+fn shortened(time: &mut Parameter, longest: f64) {
+    time.upper = time.upper.min(longest);
+    time.starts.retain(|start| *start < longest);
+    if time.starts.is_empty() {
+        time.starts.push(0.5 * longest);
     }
 }
 
@@ -186,6 +219,25 @@ mod tests {
         for (found, expected) in power.iter().zip([5.0, 10.0 / 4.0 + 5.0, 5.0 - left]) {
             assert!((found - expected).abs() < 1e-3, "{power:?}, not {expected}");
         }
+    }
+
+    /// In a day of 6.5 hours: not what takes three days to fade, nor what begins to fade after an hour.
+    #[test]
+    fn a_decay_is_one_of_which_recordings_show_the_end() {
+        let day = Typical { duration: 23_400.0, ..Typical::default() };
+        for form in Mechanism::<Execution>::sought(&TransientImpact, &day) {
+            let seconds = form.parameters.iter().filter(|p| p.unit == "s");
+            let bounds: Vec<f64> = seconds.map(|p| p.upper).collect();
+            assert!(bounds == [if form.name.starts_with("power") { 234.0 } else { 11_700.0 }], "{}: {bounds:?}", form.name);
+            let within = |p: &Parameter| p.starts.iter().all(|start| (p.lower..=p.upper).contains(start));
+            assert!(form.parameters.iter().all(|p| p.starts.is_empty() || within(p)), "{form:?}");
+        }
+        let brief = Typical { duration: 5.0, ..Typical::default() };
+        let forms = Mechanism::<Execution>::sought(&TransientImpact, &brief);
+        assert!(forms.iter().flat_map(|form| &form.parameters).all(|p| !p.starts.is_empty() || p.name == "paid"));
+        // Whoever says what a broker does may say what he likes.
+        let said = Mechanism::<Execution>::forms(&TransientImpact, &day);
+        assert!(said[0].parameters[1].upper > 1e6);
     }
 
     #[test]

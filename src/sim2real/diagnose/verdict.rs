@@ -273,8 +273,7 @@ fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) 
         let visible = findings.fits.iter().any(above_the_noise);
         return match findings.sampled {
             true => unconfirmed(library(effects), clean, visible),
-            false if findings.refuted => Verdict::Unexplained,
-            false => Verdict::NotExcited,
+            false => unconfirmed_by_messages(findings.refuted, left_over, findings.remainder),
         };
     }
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
@@ -299,6 +298,12 @@ fn unconfirmed(known: f64, clean: bool, visible: bool) -> Verdict {
         _ if visible || known < HARDLY_THE_LIBRARY => Verdict::Unexplained,
         _ => Verdict::NotExcited,
     }
+}
+
+/// The same of messages. Where as much as before depends on something, with what was named, that is not what these messages depend on,
+/// and they do depend on something.
+fn unconfirmed_by_messages(refuted: bool, left_over: bool, remainder: f64) -> Verdict {
+    if refuted || left_over && remainder > FORM_ERROR { Verdict::Unexplained } else { Verdict::NotExcited }
 }
 
 fn parameters<T: Twin>(
@@ -412,6 +417,22 @@ mod tests {
         assert_eq!(unconfirmed(0.0, true, false), Verdict::Unexplained, "nobody believes it");
         assert_eq!(unconfirmed(0.3, true, false), Verdict::NotExcited, "nothing is off where it was not fitted");
         assert_eq!(unconfirmed(0.9, false, true), Verdict::Unexplained, "what fits neither past nor future");
+    }
+
+    #[test]
+    fn messages_that_still_depend_on_something_have_not_been_explained() {
+        assert_eq!(
+            unconfirmed_by_messages(false, true, 1.0),
+            Verdict::Unexplained,
+            "a dealer that refuses what the market moves against, and a lot size that does not carry over"
+        );
+        assert_eq!(
+            unconfirmed_by_messages(false, true, 0.01),
+            Verdict::NotExcited,
+            "what depends on something is hardly any"
+        );
+        assert_eq!(unconfirmed_by_messages(false, false, 1.0), Verdict::NotExcited, "what is left is noise");
+        assert_eq!(unconfirmed_by_messages(true, false, 0.0), Verdict::Unexplained);
     }
 
     #[test]
