@@ -1,5 +1,5 @@
-//! Nanoseconds a step of market environments: `Trade-v0` on bars without mechanisms, held and traded at every step; the same with costs,
-//! latency and randomization; quotes and books; a reset.
+//! Nanoseconds a step of market environments: `Trade-v0` on bars without mechanisms, held, turned from long to short and back by chance as
+//! in `./x environments`, and traded at every step; the same with costs, latency and randomization; quotes and books; a reset.
 //!
 //! `cargo bench --bench market_env`; divide the time of an iteration by its steps.
 
@@ -11,8 +11,19 @@ use trueup::rl::{Actions, Buffers, Options, VecEnv, Which};
 
 const STEPS: u64 = 10_000;
 
+/// What is done at each step.
+#[derive(Clone, Copy)]
+enum Done {
+    /// Nothing is traded.
+    Held,
+    /// Each action is at one end of its range, by chance: half of the steps trade where there is one.
+    Turned,
+    /// Actions are anywhere in their range.
+    Traded,
+}
+
 /// Rows of actions within the space, the same every time, from a linear congruential generator (Knuth's MMIX constants).
-fn actions(env: &dyn VecEnv, rows: usize, still: bool) -> Vec<f32> {
+fn actions(env: &dyn VecEnv, rows: usize, done: Done) -> Vec<f32> {
     let Some(space) = env.about().action.as_box() else { return Vec::new() };
     let mut state = 7_u64;
     let mut draw = || {
@@ -21,9 +32,19 @@ fn actions(env: &dyn VecEnv, rows: usize, still: bool) -> Vec<f32> {
     };
     let size = space.size();
     (0..rows * size)
-        .map(|k| match still {
-            true => 0.0,
-            false => space.low[k % size] + (space.high[k % size] - space.low[k % size]) * draw(),
+        .map(|k| {
+            let (low, high) = (space.low[k % size], space.high[k % size]);
+            match done {
+                Done::Held => 0.0,
+                Done::Turned => {
+                    if draw() < 0.5 {
+                        low
+                    } else {
+                        high
+                    }
+                }
+                Done::Traded => low + (high - low) * draw(),
+            }
         })
         .collect()
 }
@@ -48,21 +69,22 @@ fn run(env: &mut dyn VecEnv, rows: &[f32], out: &mut Buffers) -> f64 {
 fn bench(c: &mut Criterion) {
     let costs = || Options::new().with("commission", 0.5).with("latency", 0.2).with("randomization", 1.0);
     let cases = [
-        ("Trade-v0 on bars, held", "trueup/Trade-v0", Options::new(), true),
-        ("Trade-v0 on bars, traded at every step", "trueup/Trade-v0", Options::new(), false),
-        ("Trade-v0 on bars, with costs, latency and randomization", "trueup/Trade-v0", costs(), false),
-        ("Trade-v0 on quotes", "trueup/Trade-v0", Options::new().with("data", "quotes"), false),
-        ("Execute-v0 on quotes", "trueup/Execute-v0", Options::new(), false),
-        ("MakeMarket-v0 on a book", "trueup/MakeMarket-v0", Options::new(), false),
-        ("Allocate-v0, four instruments", "trueup/Allocate-v0", Options::new(), false),
+        ("Trade-v0 on bars, held", "trueup/Trade-v0", Options::new(), Done::Held),
+        ("Trade-v0 on bars, turned by chance", "trueup/Trade-v0", Options::new().with("band", 0.5), Done::Turned),
+        ("Trade-v0 on bars, traded at every step", "trueup/Trade-v0", Options::new(), Done::Traded),
+        ("Trade-v0 on bars, with costs, latency and randomization", "trueup/Trade-v0", costs(), Done::Traded),
+        ("Trade-v0 on quotes", "trueup/Trade-v0", Options::new().with("data", "quotes"), Done::Traded),
+        ("Execute-v0 on quotes", "trueup/Execute-v0", Options::new(), Done::Traded),
+        ("MakeMarket-v0 on a book", "trueup/MakeMarket-v0", Options::new(), Done::Traded),
+        ("Allocate-v0, four instruments", "trueup/Allocate-v0", Options::new(), Done::Traded),
     ];
     let mut group = c.benchmark_group("10,000 steps");
     group.throughput(Throughput::Elements(STEPS)).sample_size(20);
-    for (name, id, options, still) in cases {
+    for (name, id, options, done) in cases {
         let Some(mut env) = ENVIRONMENTS.iter().find(|entry| entry.id == id).and_then(|e| (e.make)(1, &options).ok()) else {
             continue;
         };
-        let (rows, mut out) = (actions(&*env, STEPS as usize, still), Buffers::of(&*env));
+        let (rows, mut out) = (actions(&*env, STEPS as usize, done), Buffers::of(&*env));
         if env.reset(Which::All, Some(&[1]), &Options::new(), &mut out.observations).is_err() {
             continue;
         }
