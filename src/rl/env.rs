@@ -121,10 +121,7 @@ impl<E: Env> VecEnv for Each<E> {
                 continue;
             }
             let row = &mut out.observations[lane * size..][..size];
-            let step = match one.env.step(actions.lanes(lane, 1, action_size), row) {
-                Ok(step) => step,
-                Err(error) => return Err(error.moved(lane)),
-            };
+            let step = one.env.step(actions.lanes(lane, 1, action_size), row).map_err(|error| error.moved(lane))?;
             one.under_way = !(step.terminated || step.truncated);
             (out.rewards[lane], out.terminated[lane], out.truncated[lane]) = (step.reward, step.terminated, step.truncated);
         }

@@ -238,13 +238,11 @@ impl<T: Task> Env for MarketEnv<T> {
     fn step(&mut self, action: Actions<'_>, observation: &mut [f32]) -> Result<Step, EnvError> {
         let (driver, own) = (&mut self.driver, self.shared.own);
         let Some(course) = &mut self.course else { return Err(EnvError::NotReset { lane: 0 }) };
-        let mut step = Step::default();
-        if let Err(error) = course.step(driver, action.continuous(), own, observation, &mut step) {
+        course.step(driver, action.continuous(), own, observation).map_err(|error| {
             // A run that cannot go on has no state to go on from.
             self.course = None;
-            return Err(MarketEnvError::from(error).into());
-        }
-        Ok(step)
+            MarketEnvError::from(error).into()
+        })
     }
 
     fn info(&self, channel: usize) -> f64 {
@@ -270,8 +268,7 @@ impl Course {
         action: &[f32],
         own: usize,
         observation: &mut [f32],
-        step: &mut Step,
-    ) -> Result<(), BacktestError> {
+    ) -> Result<Step, BacktestError> {
         let mut event = self.event;
         let equity = self.session.hear(event, |view, orders| driver.act(view, orders, action))?;
         self.session.send_on(event.time, equity, driver)?;
@@ -304,8 +301,7 @@ impl Course {
             () => Ended::No,
         };
         let terminated = matches!(self.ended, Ended::Done | Ended::MarginCall);
-        *step = Step { reward, terminated, truncated: !terminated && self.ended != Ended::No };
-        Ok(())
+        Ok(Step { reward, terminated, truncated: !terminated && self.ended != Ended::No })
     }
 
     /// The value of an info channel that every market environment has.

@@ -85,3 +85,37 @@ impl Normal {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::problem::project;
+    use super::*;
+
+    #[test]
+    fn are_those_of_the_derivatives_that_initial_states_leave() {
+        const ROWS: usize = 700;
+        let column =
+            |salt: usize| DVector::from_fn(ROWS, |i, _| ((i * salt + 31 * salt * salt) % 1_009) as f64 / 500.0 - 1.0);
+        let columns = |salts: &[usize]| -> Vec<DVector<f64>> { salts.iter().map(|salt| column(*salt)).collect() };
+        let initial =
+            [Parameter::new("angle", "rad", 0.1).known_to(0.01), Parameter::new("rate", "rad/s", 0.0).known_to(0.5)];
+        let (all, start) = (initial.as_slice(), [0.12, 0.3]);
+        for (initial, start) in [(all, start.as_slice()), (&all[..0], &[][..])] {
+            let by_initial = columns(&[7, 11][..initial.len()]);
+            let run = Followed { residual: column(3), derivatives: columns(&[13, 17, 19]), by_initial };
+            let (normal, whole) = (Normal::of(&run, initial, start, 2.0), project(&run, initial, start, 2.0));
+            let close = |a: &[f64], b: &[f64]| {
+                a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + b.abs()))
+            };
+            assert!(close(normal.information.as_slice(), whole.jacobian.tr_mul(&whole.jacobian).as_slice()));
+            assert!(close(normal.gradient.as_slice(), whole.jacobian.tr_mul(&whole.residual).as_slice()));
+            assert!(close(
+                &[normal.objective, normal.left],
+                &[whole.objective, whole.residual.rows(0, ROWS).norm_squared()]
+            ));
+            assert!(close(normal.initial_step[0].as_slice(), &whole.initial_step));
+            assert!(close(normal.initial_by_parameter[0].as_slice(), whole.initial_by_parameter.as_slice()));
+            assert_eq!(normal.measured, ROWS);
+        }
+    }
+}

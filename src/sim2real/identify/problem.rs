@@ -78,13 +78,13 @@ pub(super) struct Followed {
 pub(super) struct Runs(pub Vec<Followed>);
 
 /// One part evaluated: residuals, and one column a perturbed parameter.
-struct Piece {
-    residual: DVector<f64>,
-    jacobian: DMatrix<f64>,
-    initial_step: Vec<f64>,
-    initial_by_parameter: DMatrix<f64>,
+pub(super) struct Piece {
+    pub residual: DVector<f64>,
+    pub jacobian: DMatrix<f64>,
+    pub initial_step: Vec<f64>,
+    pub initial_by_parameter: DMatrix<f64>,
     initial_basis: DMatrix<f64>,
-    objective: f64,
+    pub objective: f64,
 }
 
 impl<S: Simulator> Problem<'_, S> {
@@ -335,7 +335,7 @@ fn joined<'a>(parts: impl Iterator<Item = &'a DVector<f64>> + Clone) -> DVector<
 ///
 /// With `A = [J_i; W]`, where `W` holds the priors' weights, the best step of the initial state leaves
 /// `b - Q Q' b` of `b = [r; W d]`, and likewise of every column of the Jacobian.
-fn project(run: &Followed, initial: &[Parameter], start: &[f64], misfit: f64) -> Piece {
+pub(super) fn project(run: &Followed, initial: &[Parameter], start: &[f64], misfit: f64) -> Piece {
     let Followed { residual, derivatives, .. } = run;
     let (rows, count) = (residual.len(), initial.len());
     let reach = Reach::new(run, initial, start, misfit);
