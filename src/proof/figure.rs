@@ -156,7 +156,7 @@ impl Figure {
     }
 
     /// A value with as many digits as it takes to see how it stands: 92.9 % is not the 93 % that were wanted.
-    fn told(&self, value: f64) -> String {
+    pub(super) fn told(&self, value: f64) -> String {
         let usual = self.unit.digits(value);
         let tells = |digits: &usize| {
             self.goal.is_none_or(|goal| goal.standing(self.unit.rounded(value, *digits)) == goal.standing(value))

@@ -33,7 +33,8 @@ impl Summary {
     #[must_use]
     pub fn headline(&self) -> String {
         let found = |start: &str| {
-            self.figures.iter().find(|f| f.name.starts_with(start)).map_or("–".into(), |f| f.beside(f.value))
+            let figure = self.figures.iter().find(|f| f.name.starts_with(start));
+            figure.and_then(|f| Some(f.told(f.value?))).unwrap_or_else(|| "–".into())
         };
         format!(
             "In {} blind cases, an effect that can be seen is named right {} of the time; where nothing is missing, \
@@ -89,5 +90,37 @@ fn failure(failure: &Failure) -> ProofFailure {
         said: failure.said.clone(),
         circumstances: failure.circumstances.clone(),
         errors: failure.errors.map(|error| error.map_or_else(|| "\u{2013}".to_owned(), |error| format!("{error:.2}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::confusion::Confusion;
+    use super::super::domain::Domain;
+    use super::super::figure::{Figure, Goal};
+    use super::super::reliability::Reliability;
+    use super::*;
+
+    #[test]
+    fn the_headline_tells_a_value_from_what_was_wanted_as_the_table_does() {
+        let right = Figure::share("right first", (0..73).map(|k| k < 69)).wanting(Goal::new(0.85, 0.95));
+        let told = right.shown();
+        let summary = Summary {
+            schema: String::new(),
+            domain: Domain::Robot,
+            seed: 1,
+            development: true,
+            cases: 73,
+            version: String::new(),
+            seal: String::new(),
+            figures: vec![right],
+            confusion: Confusion::of(&[]),
+            reliability: Reliability::of(&[]),
+            failures: Vec::new(),
+        };
+        assert!(told.starts_with("94.5\u{a0}%"), "{told}");
+        let headline = summary.headline();
+        assert!(headline.contains("named right 94.5\u{a0}% of the time"), "{headline}");
+        assert!(headline.contains("something is named – of the time"), "what was not measured: {headline}");
     }
 }
