@@ -76,6 +76,21 @@ def single(env, actions: list) -> Run:
     return run
 
 
+def keeping(env, actions: list) -> Run:
+    """The same, of which the last 64 observations are kept as they were given, so that none of their arrays is filled again."""
+    env.reset(seed=0)
+    count, kept = len(actions), [None] * 64
+
+    def run(steps: int) -> None:
+        step, reset = env.step, env.reset
+        for k in range(steps):
+            kept[k % 64], _, terminated, truncated, _ = step(actions[k % count])
+            if terminated or truncated:
+                reset()
+
+    return run
+
+
 def vector(env, step: Callable, lanes: int, kind=np.int64) -> Run:
     """Steps of many lanes, which reset themselves."""
     rng = np.random.default_rng(0)
@@ -139,8 +154,8 @@ def trade_env(**options):
     return gymnasium.make("trueup/Trade-v0", rows=peers.BARS, length=0, band=0.5, **options)
 
 
-def trade(**options) -> Run:
-    return single(trade_env(**options), ways(lambda way: np.array([2 * way - 1], np.float32)))
+def trade(loop: Callable = single, **options) -> Run:
+    return loop(trade_env(**options), ways(lambda way: np.array([2 * way - 1], np.float32)))
 
 
 def turned() -> str:
@@ -172,6 +187,7 @@ MARKET = "One market of 5,000 bars, long or short by the same draws"
 TABLES: dict[str, list[tuple[str, int, Callable[[], Run]]]] = {
     "One cart-pole, by `gymnasium.make`": [
         ("trueup/CartPole-v0", 1, lambda: single(gymnasium.make(CART_POLE), choices())),
+        ("trueup/CartPole-v0, observations kept", 1, lambda: keeping(gymnasium.make(CART_POLE), choices())),
         ("Gymnasium's CartPole-v1", 1, lambda: single(gymnasium.make("CartPole-v1"), choices())),
     ],
     "One cart-pole, on buffers that were bound": [
@@ -197,6 +213,7 @@ TABLES: dict[str, list[tuple[str, int, Callable[[], Run]]]] = {
     ],
     MARKET: [
         ("trueup/Trade-v0, without info", 1, lambda: trade(info=False)),
+        ("trueup/Trade-v0, without info, observations kept", 1, lambda: trade(keeping, info=False)),
         ("trueup/Trade-v0, with twelve figures of info", 1, trade),
         ("gym-anytrading's StocksEnv", 1, lambda: single(peers.anytrading(), ways(int))),
         ("gym-trading-env's TradingEnv", 1, lambda: single(peers.trading_env(), ways(int))),

@@ -2,7 +2,7 @@
 
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use trueup::rl::{Actions, Kept, Out};
+use trueup::rl::{Actions, Kept, Out, choices_of_32_bits, rewards_of_32_bits};
 
 use crate::environment::{Lanes, drive, scattered};
 
@@ -74,8 +74,7 @@ impl BoundLanes {
             ActionBuffer::Real(real) => Actions::Continuous(read(py, real)?),
             ActionBuffer::Choice(choice) => Actions::Discrete(read(py, choice)?),
             ActionBuffer::ShortChoice(short, own) => {
-                own.clear();
-                own.extend(read(py, short)?.iter().map(|choice| i64::from(*choice)));
+                choices_of_32_bits(read(py, short)?, own);
                 Actions::Discrete(own)
             }
         };
@@ -94,7 +93,7 @@ impl BoundLanes {
         };
         drive(py, self.lanes.borrow_mut(py).driven(), |driver| driver.step(actions, &mut out))?;
         if let RewardBuffer::Single(single, own) = &self.rewards {
-            written(py, single)?.iter_mut().zip(own).for_each(|(single, own)| *single = *own as f32);
+            rewards_of_32_bits(own, written(py, single)?);
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ use trueup::rl::{Actions, AutoresetMode, Checked, EnvEntry, EnvError, Kept, Out,
 
 use crate::about::about;
 use crate::error;
+use crate::fresh::Fresh;
 use crate::options::{market_of, options_of};
 use crate::work::words;
 
@@ -48,8 +49,9 @@ pub struct Lanes {
     size: usize,
     /// Shapes of a lane's observation and action.
     shapes: [Vec<usize>; 2],
-    /// Of a single environment: what it observed last, which the array it gives out is made of.
+    /// Of a single environment: what it observed last, which the array it gives out is filled with.
     row: Vec<f32>,
+    fresh: Fresh,
     /// Whether its steps give info, and under which names.
     informs: bool,
     names: PyOnceLock<Vec<Py<PyString>>>,
@@ -71,6 +73,7 @@ impl Lanes {
             size,
             shapes,
             row: vec![0.0; size],
+            fresh: Fresh::default(),
             informs: true,
             names: PyOnceLock::new(),
             reader: None,
@@ -93,24 +96,23 @@ impl Lanes {
     /// A step by the action of a single environment: a choice, an array that can be read as it is, or whatever the reader makes an array
     /// of.
     fn stepped_by(&mut self, py: Python<'_>, action: &Bound<'_, PyAny>, out: &mut Out<'_>) -> PyResult<()> {
+        if let [count @ 1..=FEW] = self.shapes[1][..]
+            && let Ok(array) = action.cast_exact::<PyArray1<f32>>()
+            && array.len() == count
+        {
+            let mut few = [0.0; FEW];
+            (0..count).for_each(|k| few[k] = array.get_owned([k]).unwrap_or(f32::NAN));
+            return drive(py, self.driven(), |driver| driver.step(Actions::Continuous(&few[..count]), out));
+        }
         if let Some(choice) = plain(action) {
             return drive(py, self.driven(), |driver| driver.step(Actions::Discrete(&[choice]), out));
         }
         if let Ok(array) = action.cast_exact::<PyArrayDyn<f32>>()
             && !self.shapes[1].is_empty()
             && array.shape() == self.shapes[1].as_slice()
+            && array.is_c_contiguous()
         {
-            let count = array.len();
-            if let [_] = self.shapes[1][..]
-                && count <= FEW
-            {
-                let mut few = [0.0; FEW];
-                (0..count).for_each(|k| few[k] = array.get_owned(&[k][..]).unwrap_or(f32::NAN));
-                return drive(py, self.driven(), |driver| driver.step(Actions::Continuous(&few[..count]), out));
-            }
-            if array.is_c_contiguous() {
-                return self.stepped(py, action, out);
-            }
+            return self.stepped(py, action, out);
         }
         match &self.reader {
             Some(reader) => {
@@ -251,7 +253,7 @@ impl Lanes {
         let mut out =
             Out { observations: &mut row, rewards: &mut reward, terminated: &mut terminated, truncated: &mut truncated };
         let told = self.stepped_by(py, action, &mut out).and_then(|()| {
-            let observed = PyArray1::from_slice(py, &row);
+            let observed = self.fresh.with(py, &row);
             let info = self.info_of_one(py)?;
             let shape = &self.shapes[0];
             let observed =

@@ -9,6 +9,7 @@ mod bound;
 mod command;
 mod environment;
 mod error;
+mod fresh;
 mod initial;
 mod options;
 mod orders;

@@ -6,6 +6,7 @@ import copy
 import pickle
 import tomllib
 import warnings
+import weakref
 
 import numpy as np
 import pytest
@@ -31,6 +32,57 @@ def played(env, steps, seed=None, actions_seed=0):
         if terminated or truncated:
             out.append(env.reset()[0].tobytes())
     return out
+
+
+def test_what_was_observed_is_the_callers_alone_however_it_is_held():
+    env = envs.make(CART_POLE)
+    env.reset(seed=1)
+    kept, bytes_then = [], []
+    for k in range(400):
+        observation, _, terminated, _, _ = env.step(k % 2)
+        bytes_then.append(observation.tobytes())
+        # By a variable, a view, a buffer, a reshaped view, a weak reference; and some are let go.
+        ways = [lambda o: o, lambda o: o[:], memoryview, lambda o: o.reshape(2, 2), weakref.ref, lambda o: None]
+        kept.append(ways[k % 6](observation))
+        if terminated:
+            env.reset()
+        del observation
+    for now, then in zip(kept, bytes_then, strict=True):
+        now = now() if isinstance(now, weakref.ref) else now
+        assert now is None or now.tobytes() == then
+    other = copy.deepcopy(env)
+    first, second = env.step(1)[0], other.step(1)[0]
+    assert first.tobytes() == second.tobytes() and not np.shares_memory(first, second)
+
+
+def test_whatever_was_done_to_an_array_the_next_is_as_it_should_be():
+    def shaped(observation):
+        observation.shape = (2, 2)
+
+    def other_numbers(observation):
+        observation.dtype = np.int32
+
+    def shorter(observation):
+        observation.resize(3, refcheck=False)
+
+    def locked(observation):
+        observation.flags.writeable = False
+
+    def written(observation):
+        observation[:] = np.nan
+
+    env, same = envs.make(CART_POLE), envs.make(CART_POLE)
+    for meddle in (shaped, other_numbers, shorter, locked, written):
+        env.reset(seed=3), same.reset(seed=3)
+        for k in range(8):
+            observation, expected = env.step(k % 2)[0], same.step(k % 2)[0]
+            assert observation.tobytes() == expected.tobytes() and observation.shape == (4,), meddle
+            assert observation.dtype == np.float32 and observation.flags.writeable and observation.flags.c_contiguous, meddle
+            with warnings.catch_warnings():
+                # NumPy advises against some of it.
+                warnings.simplefilter("ignore")
+                meddle(observation)
+            del observation
 
 
 def test_there_are_environments():

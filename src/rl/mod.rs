@@ -60,6 +60,7 @@
 
 mod about;
 mod autoreset;
+mod bits32;
 mod check;
 mod checked;
 mod env;
@@ -67,6 +68,7 @@ mod episodes;
 mod error;
 mod options;
 mod registry;
+
 mod space;
 mod stream;
 mod threads;
@@ -78,6 +80,7 @@ pub mod wrapper;
 pub use crate::sim2real::SplitMix64;
 pub use about::{About, InfoChannel};
 pub use autoreset::{Autoreset, AutoresetMode, Finals, Kept};
+pub use bits32::{choices_of_32_bits, rewards_of_32_bits};
 pub use check::{EnvReport, Finding, Rule, check_env};
 pub use checked::Checked;
 pub use env::{Each, Env, Step};

@@ -53,6 +53,9 @@ impl Position {
     /// The part of the basis that belongs to `closed` of `all` held, rounded towards 0 to 1e-18 of the currency: what is
     /// rounded off stays with the rest, so that nothing is lost.
     pub(super) fn basis_of(&self, closed: i64, all: i64) -> Cash {
+        if closed == all {
+            return self.basis;
+        }
         let (all, closed) = (i128::from(all), i128::from(closed));
         let (each, over) = (self.basis.0 / all, self.basis.0 % all);
         Cash(each * closed + over * closed / all)

@@ -177,10 +177,11 @@ pub(super) fn advance<const N: usize>(
 ) {
     let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
     sines(angle, &mut sin, &mut cos);
-    let c = constants;
-    let [mass, swinging, lever, weight, hinge, friction, turning, lightness, gain] =
-        [&c.mass, &c.swinging, &c.lever, &c.weight, &c.hinge, &c.friction, &c.turning, &c.lightness, &c.gain]
-            .map(|constant| constant.of(first, position.len()));
+    let (c, count) = (constants, position.len());
+    // One by one: a loop over them may be a function of its own, which is called for every tile.
+    let (mass, swinging, lever) = (c.mass.of(first, count), c.swinging.of(first, count), c.lever.of(first, count));
+    let (weight, hinge, friction) = (c.weight.of(first, count), c.hinge.of(first, count), c.friction.of(first, count));
+    let (turning, lightness, gain) = (c.turning.of(first, count), c.lightness.of(first, count), c.gain.of(first, count));
     euler(
         position, velocity, angle, spin, commands, &sin, &cos, mass, swinging, lever, weight, hinge, friction, turning,
         lightness, gain, step,
