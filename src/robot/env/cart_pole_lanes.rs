@@ -8,8 +8,9 @@
 use pulp::{Arch, NullaryFnOnce};
 
 use super::cart_pole::{START, Thresholds};
-use super::cart_pole_motion::{Constants, SMALL_TILE, TILE, advance};
+use super::cart_pole_motion::{Constants, SMALL_TILE, TILE, Tile, advance};
 use super::cart_pole_wires::{Delay, Noise, Wires, plain};
+use super::row::Row;
 use crate::rl::{Episode, Out};
 use crate::sim2real::Seed;
 use crate::sim2real::normal_draw::AT_ONCE;
@@ -34,10 +35,10 @@ pub(super) fn started(episode: Episode, start: Start) -> [f64; 4] {
 #[derive(Debug, Clone)]
 pub(super) struct CartPoleLanes {
     /// Cart position [m] and velocity [m/s], pole angle [rad] and angular velocity [rad/s].
-    position: Vec<f64>,
-    velocity: Vec<f64>,
-    angle: Vec<f64>,
-    spin: Vec<f64>,
+    position: Row,
+    velocity: Row,
+    angle: Row,
+    spin: Row,
     /// Steps of each lane's episode.
     steps: Vec<u32>,
     constants: Constants,
@@ -60,7 +61,7 @@ impl CartPoleLanes {
         (step, max_steps): (f64, u32),
         thresholds: Thresholds,
     ) -> Self {
-        let zeros = || vec![0.0; count];
+        let zeros = || Row::new(0.0, count);
         let mut lanes = Self {
             position: zeros(),
             velocity: zeros(),
@@ -138,16 +139,16 @@ impl CartPoleLanes {
     fn step_tile<const N: usize>(&mut self, first: usize, actions: &[i64; N], out: &mut Out<'_>) {
         let own = first..first + N;
         let steps = &mut self.steps[own.clone()];
-        let mut commands = [0.0; N];
+        let mut commands = Tile([0.0; N]);
         match &mut self.delay {
-            None => plain(actions, &mut commands),
-            Some(delay) => delay.pass(first, actions, steps, &mut commands),
+            None => plain(actions, &mut commands.0),
+            Some(delay) => delay.pass(first, actions, steps, &mut commands.0),
         }
         steps.iter_mut().for_each(|steps| *steps = steps.saturating_add(1));
         late(steps, self.max_steps, &mut out.truncated[own.clone()]);
         let (position, velocity) = (&mut self.position[own.clone()], &mut self.velocity[own.clone()]);
         let (angle, spin) = (&mut self.angle[own.clone()], &mut self.spin[own.clone()]);
-        advance(position, velocity, angle, spin, &commands, &self.constants, first, self.step);
+        advance(position, velocity, angle, spin, &commands.0, &self.constants, first, self.step);
         over(position, angle, self.thresholds, &mut out.terminated[own.clone()]);
         let (rows, _) = out.observations[4 * first..4 * own.end].as_chunks_mut();
         match &mut self.noise {

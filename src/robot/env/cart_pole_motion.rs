@@ -4,6 +4,8 @@
 
 use crate::robot::sine::sine;
 
+use super::row::Row;
+
 /// Lanes that are stepped at once: what is known of them between one loop and the next stays close to the processor.
 pub(super) const TILE: usize = 64;
 
@@ -33,24 +35,29 @@ pub(super) struct Constants {
     gain: Constant,
 }
 
+/// A number for each lane of a tile, from the beginning of a cache line on, as in a [`Row`].
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub(super) struct Tile<const N: usize>(pub [f64; N]);
+
 /// One number for all lanes, or one for each.
 #[derive(Debug, Clone)]
 #[allow(clippy::large_enum_variant, reason = "there are nine of them in all, and what a loop reads lies beside it")]
 enum Constant {
-    Same([f64; TILE]),
-    Own(Vec<f64>),
+    Same(Tile<TILE>),
+    Own(Row),
 }
 
 impl Constant {
     fn new(value: f64, lanes: Option<usize>) -> Self {
-        lanes.map_or(Self::Same([value; TILE]), |lanes| Self::Own(vec![value; lanes]))
+        lanes.map_or(Self::Same(Tile([value; TILE])), |lanes| Self::Own(Row::new(value, lanes)))
     }
 
     /// Those of `count` lanes from lane `first`.
     #[inline(always)]
     fn of(&self, first: usize, count: usize) -> &[f64] {
         match self {
-            Self::Same(value) => &value[..count],
+            Self::Same(tile) => &tile.0[..count],
             Self::Own(values) => &values[first..first + count],
         }
     }
@@ -100,7 +107,7 @@ impl Constants {
     fn lane(&self, lane: usize) -> [f64; 9] {
         let Self { mass, swinging, lever, weight, hinge, friction, turning, lightness, gain } = self;
         let of = |constant: &Constant| match constant {
-            Constant::Same(value) => value[0],
+            Constant::Same(tile) => tile.0[0],
             Constant::Own(values) => values[lane],
         };
         [mass, swinging, lever, weight, hinge, friction, turning, lightness, gain].map(of)
@@ -175,15 +182,15 @@ pub(super) fn advance<const N: usize>(
     first: usize,
     step: f64,
 ) {
-    let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
-    sines(angle, &mut sin, &mut cos);
+    let (mut sin, mut cos) = (Tile([0.0; N]), Tile([0.0; N]));
+    sines(angle, &mut sin.0, &mut cos.0);
     let (c, count) = (constants, position.len());
     // One by one: a loop over them may be a function of its own, which is called for every tile.
     let (mass, swinging, lever) = (c.mass.of(first, count), c.swinging.of(first, count), c.lever.of(first, count));
     let (weight, hinge, friction) = (c.weight.of(first, count), c.hinge.of(first, count), c.friction.of(first, count));
     let (turning, lightness, gain) = (c.turning.of(first, count), c.lightness.of(first, count), c.gain.of(first, count));
     euler(
-        position, velocity, angle, spin, commands, &sin, &cos, mass, swinging, lever, weight, hinge, friction, turning,
+        position, velocity, angle, spin, commands, &sin.0, &cos.0, mass, swinging, lever, weight, hinge, friction, turning,
         lightness, gain, step,
     );
 }

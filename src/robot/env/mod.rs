@@ -10,6 +10,7 @@ mod cart_pole_wires;
 mod draws;
 mod pendulum;
 mod pendulum_lanes;
+mod row;
 mod servo;
 mod set_point;
 mod setting;
