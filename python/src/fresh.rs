@@ -39,18 +39,22 @@ fn nobody_holds(array: &Bound<'_, PyArray1<f32>>) -> bool {
     // SAFETY: the pointers are of an array that is alive, and read under Python's lock.
     unsafe {
         let fields = _PyArray_GET_ITEM_DATA(array.as_array_ptr().cast_const());
-        pyo3::ffi::Py_REFCNT(array.as_ptr()) == 1
-            && (*fields).weakreflist.is_null()
-            && (*fields).flags & NPY_ARRAY_WRITEABLE != 0
+        pyo3::ffi::Py_REFCNT(array.as_ptr()) == 1 && (*fields).weakreflist.is_null()
     }
 }
 
-/// Writes into an array that nobody else holds, if it is of the kind it was made: whoever held it may have given it another shape, or
-/// its bytes another meaning.
+/// Writes into an array that nobody else holds, if it is as it was made: whoever held it may have given it another shape, or its bytes
+/// another meaning, may have locked it, or, with an older NumPy, put it on the memory of another.
 #[inline]
 #[allow(unsafe_code)]
 fn filled(array: &Bound<'_, PyArray1<f32>>, numbers: &[f32]) -> bool {
-    if !array.as_any().is_exact_instance_of::<PyArray1<f32>>() {
+    // SAFETY: as above.
+    let (base, flags) = unsafe {
+        let fields = _PyArray_GET_ITEM_DATA(array.as_array_ptr().cast_const());
+        ((*fields).base, (*fields).flags)
+    };
+    let own = base.is_null() && flags & NPY_ARRAY_WRITEABLE != 0;
+    if !own || !array.as_any().is_exact_instance_of::<PyArray1<f32>>() {
         return false;
     }
     // SAFETY: nobody else has it, so nobody reads or writes it meanwhile.

@@ -68,7 +68,6 @@ mod episodes;
 mod error;
 mod options;
 mod registry;
-
 mod space;
 mod stream;
 mod threads;
