@@ -1,7 +1,7 @@
 //! `cart_pole`: a cart on a track, and a pole that swings freely on it.
 
 use super::cart_pole_lane::Lane;
-use super::estimate::{local, motion, rounding, typical};
+use super::estimate::{initial_rate, local, motion, rounding, typical};
 use super::joint::Axis;
 use super::mover::{Motion, Mover, Push};
 use super::runge_kutta::{Contact, step_with_friction};
@@ -157,12 +157,15 @@ impl Plant for CartPole {
     fn initial_parameters(&self, recording: &Recording<Commands>, row: usize) -> Vec<Parameter> {
         let cart = local(recording, "position", "velocity", row).unwrap_or_default();
         let pole = local(recording, "angle", "angular_velocity", row).unwrap_or_default();
-        let wide = 0.3 * self.typical(std::slice::from_ref(recording)).output.max(1e-9);
+        let recordings = std::slice::from_ref(recording);
+        let moves = self.typical(recordings);
+        let turns = typical(recordings, "angle", "angular_velocity", 1.0).rate;
+        let wide = 0.3 * moves.output.max(1e-9);
         vec![
             Parameter::new("initial position", "m", cart.value).known_to(wide),
-            Parameter::new("initial velocity", "m/s", cart.rate).known_to(cart.rate_std.max(1e-9)),
+            initial_rate("initial velocity", "m/s", &cart, row, moves.rate),
             Parameter::new("initial angle", "rad", pole.value).known_to(0.1),
-            Parameter::new("initial angular velocity", "rad/s", pole.rate).known_to(pole.rate_std.max(1e-9)),
+            initial_rate("initial angular velocity", "rad/s", &pole, row, turns),
         ]
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::sim2real::{Measured, Recording, Typical};
+use crate::sim2real::{Measured, Parameter, Recording, Typical};
 
 /// Value and rate of a channel at one row, as measured.
 #[derive(Debug, Clone, Copy, Default)]
@@ -79,6 +79,13 @@ fn enough(points: &[(f64, f64)]) -> bool {
 /// The same at every row; zeros where nothing was measured nearby.
 pub(super) fn motion<S>(recording: &Recording<S>, channel: &str, rate: &str) -> Vec<Estimate> {
     (0..recording.len()).map(|row| local(recording, channel, rate, row).unwrap_or_default()).collect()
+}
+
+/// The rate with which a recording begins, as its first samples have it; or that of the middle of one, from `row` on. A recording may
+/// well begin at rest, and otherwise at a rate of about `usual`.
+pub(super) fn initial_rate(name: &'static str, unit: &'static str, seen: &Estimate, row: usize, usual: f64) -> Parameter {
+    let parameter = Parameter::new(name, unit, seen.rate).known_to(seen.rate_std.max(1e-9));
+    if row == 0 { parameter.at_rest_or_about(usual) } else { parameter }
 }
 
 /// Typical sizes of a plant whose first channel is `channel` with the rate `rate`, driven by `commands` [unit of the

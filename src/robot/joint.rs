@@ -1,6 +1,6 @@
 //! `joint`: one servo joint, or a linear axis.
 
-use super::estimate::{local, motion, rounding, typical};
+use super::estimate::{initial_rate, local, motion, rounding, typical};
 use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
 use super::sine::{sine, sines};
@@ -171,7 +171,7 @@ impl Plant for Joint {
         let typical = self.typical(std::slice::from_ref(recording));
         vec![
             Parameter::new("initial position", "rad", estimate.value).known_to(0.3 * typical.output.max(1e-9)),
-            Parameter::new("initial velocity", "rad/s", estimate.rate).known_to(estimate.rate_std.max(1e-9)),
+            initial_rate("initial velocity", "rad/s", &estimate, row, typical.rate),
         ]
     }
 

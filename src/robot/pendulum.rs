@@ -1,6 +1,6 @@
 //! `pendulum`: a rod on a hinge, driven by a torque, as Gymnasium has it.
 
-use super::estimate::{local, motion, rounding, typical};
+use super::estimate::{initial_rate, local, motion, rounding, typical};
 use super::joint::{Axis, CREEP_RATE, CREEP_SHARE, Posture};
 use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
@@ -85,9 +85,10 @@ impl Plant for Pendulum {
 
     fn initial_parameters(&self, recording: &Recording<Commands>, row: usize) -> Vec<Parameter> {
         let estimate = local(recording, "angle", "angular_velocity", row).unwrap_or_default();
+        let typical = self.typical(std::slice::from_ref(recording));
         vec![
             Parameter::new("initial angle", "rad", estimate.value).known_to(0.3),
-            Parameter::new("initial angular velocity", "rad/s", estimate.rate).known_to(estimate.rate_std.max(1e-9)),
+            initial_rate("initial angular velocity", "rad/s", &estimate, row, typical.rate),
         ]
     }
 

@@ -23,6 +23,8 @@ pub struct Parameter {
     pub starts: Vec<f64>,
     /// What time stamps or the like show of it by themselves, better than any fit could: value and standard deviation.
     pub shown: Option<[f64; 2]>,
+    /// For an initial state: that it may well be exactly 0, as where a recording begins at rest, and about how large it is otherwise.
+    pub rests_or: Option<f64>,
     /// Whether the output is differentiable in it, to within the step of a finite difference.
     pub smooth: bool,
     /// Whether its effect grows in proportion to it, from the nominal value on, where it is small: a screen then solves
@@ -51,6 +53,7 @@ impl Parameter {
             prior: None,
             starts: Vec::new(),
             shown: None,
+            rests_or: None,
             smooth: true,
             linear: false,
             source: Cow::Borrowed(""),
@@ -76,6 +79,13 @@ impl Parameter {
     #[must_use]
     pub fn starting_at(mut self, starts: &[f64]) -> Self {
         self.starts = starts.to_vec();
+        self
+    }
+
+    /// Says of an initial state that it may well be exactly 0, and otherwise is about this large.
+    #[must_use]
+    pub fn at_rest_or_about(mut self, size: f64) -> Self {
+        self.rests_or = Some(size).filter(|size| *size > 0.0 && size.is_finite());
         self
     }
 

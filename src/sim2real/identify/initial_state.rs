@@ -80,6 +80,14 @@ impl Reach {
         &self.priors
     }
 
+    /// Standard deviations of the initial parameters, as noise and priors leave them where all else is known; infinite for one that
+    /// leads nowhere.
+    pub fn std(&self) -> Vec<f64> {
+        let count = self.priors.len();
+        let inverse = self.r.solve_upper_triangular(&DMatrix::identity(count, count));
+        (0..count).map(|k| inverse.as_ref().map_or(f64::INFINITY, |inverse| inverse.row(k).norm())).collect()
+    }
+
     /// An orthonormal basis of what it can explain, over the measured rows and then the priors'.
     pub fn basis(&self) -> &DMatrix<f64> {
         &self.q

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::columns::{gram, slices};
 use super::initial_state::State;
 use super::normal::Normal;
-use super::problem::{DIFFERENCE, Problem, Runs};
+use super::problem::{DIFFERENCE, Evaluation, Problem, Runs};
 use crate::sim2real::{Parameter, Simulator};
 
 /// Directions in which the data move the parameters less than this part of the strongest count as not determined:
@@ -41,6 +41,8 @@ pub struct Fit {
     pub free: Vec<usize>,
     /// Initial states of all parts.
     pub state: State,
+    /// Their standard deviations as noise and priors make them; infinite for those not determined.
+    pub initial_std: Vec<Vec<f64>>,
     /// Residuals at the solution, in units of the noise: those of the problem's blocks, then those of priors.
     pub residual: DVector<f64>,
     /// Derivatives of the residuals by those of the free parameters that it depends on smoothly.
@@ -332,12 +334,14 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let at_bound = free.iter().copied().filter(|k| parameters[*k].at_bound(theta[*k])).collect();
         let penalty: f64 = free.iter().map(|k| prior_penalty(problem, *k, theta[*k])).sum();
         let prior = state.misfit.powi(2) * penalty;
+        let initial_std = initial_std(&evaluation, covariance.as_ref());
         Fit {
             values: theta,
             std,
             covariance,
             free: free.to_vec(),
             state,
+            initial_std,
             residual: evaluation.residual,
             jacobian: evaluation.jacobian,
             rank,
@@ -345,6 +349,20 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             at_bound,
         }
     }
+}
+
+/// Standard deviations of initial states: what is left open where all else is known, and what `covariance` of the rest adds.
+fn initial_std(evaluation: &Evaluation, covariance: Option<&DMatrix<f64>>) -> Vec<Vec<f64>> {
+    let parts = evaluation.initial_std.iter().zip(&evaluation.initial_by_parameter);
+    parts
+        .map(|(alone, by_parameter)| {
+            let added = |row: usize| {
+                let row = by_parameter.row(row);
+                covariance.map_or(0.0, |c| (row * c).dot(&row).max(0.0))
+            };
+            alone.iter().enumerate().map(|(row, alone)| (alone * alone + added(row)).sqrt()).collect()
+        })
+        .collect()
 }
 
 /// `-(H + damping diag H)^-1 g` over the parameters that are not held, in units in which the diagonal of `H` is 1.

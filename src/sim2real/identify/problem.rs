@@ -59,6 +59,8 @@ pub struct Evaluation {
     pub initial_step: Vec<Vec<f64>>,
     /// How these steps change with the parameters asked for: to be taken off, one row an initial parameter.
     pub initial_by_parameter: Vec<DMatrix<f64>>,
+    /// Standard deviations of each part's initial parameters, as noise and priors leave them where all else is known.
+    pub initial_std: Vec<Vec<f64>>,
     /// What each part's initial parameters can explain: an orthonormal basis over its measured rows, then their priors'.
     pub initial_basis: Vec<DMatrix<f64>>,
     /// Sum of squares of what is measured and of what priors of initial states add, before they are moved.
@@ -83,6 +85,7 @@ pub(super) struct Piece {
     pub jacobian: DMatrix<f64>,
     pub initial_step: Vec<f64>,
     pub initial_by_parameter: DMatrix<f64>,
+    initial_std: Vec<f64>,
     initial_basis: DMatrix<f64>,
     pub objective: f64,
 }
@@ -162,6 +165,7 @@ impl<S: Simulator> Problem<'_, S> {
             measured: measured.iter().sum(),
             initial_step: Vec::with_capacity(count),
             initial_by_parameter: Vec::with_capacity(count),
+            initial_std: Vec::with_capacity(count),
             initial_basis: Vec::with_capacity(count),
             objective,
         };
@@ -172,6 +176,7 @@ impl<S: Simulator> Problem<'_, S> {
             }
             whole.initial_step.push(piece.initial_step);
             whole.initial_by_parameter.push(piece.initial_by_parameter);
+            whole.initial_std.push(piece.initial_std);
             whole.initial_basis.push(piece.initial_basis);
         }
         whole
@@ -354,5 +359,13 @@ pub(super) fn project(run: &Followed, initial: &[Parameter], start: &[f64], misf
     let along = products(&basis, &slices(&jacobian));
     let initial_by_parameter = reach.solved(&along);
     take_out(&mut jacobian.as_mut_slice().chunks_mut((rows + count).max(1)).collect::<Vec<_>>(), &basis, &along);
-    Piece { residual: b, jacobian, initial_step, initial_by_parameter, objective, initial_basis: reach.into_basis() }
+    Piece {
+        residual: b,
+        jacobian,
+        initial_step,
+        initial_by_parameter,
+        initial_std: reach.std(),
+        objective,
+        initial_basis: reach.into_basis(),
+    }
 }
