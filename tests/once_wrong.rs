@@ -120,3 +120,14 @@ fn a_run_that_parts_at_a_bounce_does_not_unsay_an_end_stop() {
 fn doubts_and_an_error_that_is_seen_elsewhere_are_something_unknown() {
     assert_eq!(tried(1006, 11).verdict, Verdict::Unexplained);
 }
+
+/// Arms released from rest: a late sensor still shows them at rest, a late command does not keep them from falling. Before it was asked
+/// whether what rested has to be set in motion, either name was as good.
+#[test]
+fn a_late_sensor_is_told_from_a_late_command_by_what_began_at_rest() {
+    for (seed, index, name) in [(62, 136, "observation_delay"), (61, 59, "command_delay"), (51, 145, "observation_delay")] {
+        let trial = tried(seed, index);
+        assert_eq!(names(&trial), [name], "seed {seed}, case {index}: {:?}", trial.found);
+        assert!(trial.found[0].confidence > 0.9, "{:?}", trial.found);
+    }
+}

@@ -34,6 +34,7 @@ mod profile;
 mod prove;
 mod recognize;
 mod remainder;
+mod rested;
 mod rivals;
 mod screen;
 mod select;

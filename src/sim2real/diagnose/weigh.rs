@@ -3,9 +3,10 @@
 use std::cmp::Ordering;
 
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::rested::rested;
 use super::screen::Screened;
 use super::whiteness::ChannelMisfit;
-use crate::sim2real::identify::{Effort, State};
+use crate::sim2real::identify::Effort;
 use crate::sim2real::{Clock, Parameter, Twin};
 
 /// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
@@ -109,26 +110,7 @@ pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: 
         },
         longer => longer * (1.0 + least_left(a, b).misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln(),
     };
-    said + by_own + at_rest(a) - at_rest(b)
-}
-
-/// Twice the logarithm of by how much likelier what was fitted is where recordings begin at rest than where they begin anyhow: what
-/// has to set in motion what rested to explain a recording explains it worse. 0 where it does not begin at rest.
-///
-/// A spike at rest beside a slab as wide as motion usually is (George & McCulloch, "Variable selection via Gibbs sampling", Journal of
-/// the American Statistical Association 88 (1993)).
-fn at_rest<T>(hypothesis: &Hypothesis<T>) -> f64 {
-    let State { initial, values, .. } = &hypothesis.fit.state;
-    // What is left may be more than noise, and every so many rows of it tell one thing.
-    let widening = |m: &ChannelMisfit| (m.sum_of_squares / m.count.max(1) as f64).max(1.0) * m.autocorrelation_time.max(1.0);
-    let widened = hypothesis.misfits.iter().map(widening).fold(1.0, f64::max);
-    let all = initial.iter().flatten().zip(values.iter().flatten()).zip(hypothesis.fit.initial_std.iter().flatten());
-    all.filter_map(|((parameter, value), std)| {
-        let (slab, known) = (parameter.rests_or?.powi(2), widened * std * std);
-        let rested = ((known + slab) / known).ln() - value * value * slab / (known * (known + slab));
-        Some(if rested.is_finite() { rested.max(0.0) } else { 0.0 })
-    })
-    .sum()
+    said + by_own + rested(a) - rested(b)
 }
 
 /// How many of the laws of `hypothesis` are others at other times.
@@ -329,14 +311,14 @@ pub(super) fn pursued<T: Twin>(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
-    use crate::sim2real::identify::Fit;
+    use crate::sim2real::identify::{Fit, State};
 
     /// What leaves a mean square of 6,000 residuals, as many of which are effective as that.
-    fn leaving(mean_square: f64, effective: f64) -> Hypothesis<()> {
+    pub fn leaving(mean_square: f64, effective: f64) -> Hypothesis<()> {
         let count = 6_000;
         let misfit = ChannelMisfit {
             channel: "position".into(),

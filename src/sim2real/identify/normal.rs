@@ -116,6 +116,15 @@ mod tests {
             assert!(close(normal.initial_step[0].as_slice(), &whole.initial_step));
             assert!(close(normal.initial_by_parameter[0].as_slice(), whole.initial_by_parameter.as_slice()));
             assert_eq!(normal.measured, ROWS);
+            // `(A'A)^-1` of the derivatives by the initial state, with the rows of its priors below, at twice their weight.
+            let a = DMatrix::from_fn(ROWS + initial.len(), initial.len(), |row, k| match row.checked_sub(ROWS) {
+                None => run.by_initial[k][row],
+                Some(prior) if prior == k => 2.0 / initial[k].prior.unwrap(),
+                Some(_) => 0.0,
+            });
+            let covariance = a.tr_mul(&a).try_inverse().unwrap();
+            let std: Vec<f64> = covariance.diagonal().iter().map(|variance| variance.sqrt()).collect();
+            assert!(close(&whole.initial_std, &std), "{:?} {std:?}", whole.initial_std);
         }
     }
 }
