@@ -121,6 +121,12 @@ fn doubts_and_an_error_that_is_seen_elsewhere_are_something_unknown() {
     assert_eq!(tried(1006, 11).verdict, Verdict::Unexplained);
 }
 
+/// A backlash whose fit runs away: what is not a number was taken for the best, and nothing could be weighed beside it.
+#[test]
+fn a_fit_that_runs_away_is_weighed_as_none() {
+    assert_eq!(names(&tried(51, 167)), ["drift"]);
+}
+
 /// Arms released from rest: a late sensor still shows them at rest, a late command does not keep them from falling. Before it was asked
 /// whether what rested has to be set in motion, either name was as good.
 #[test]
