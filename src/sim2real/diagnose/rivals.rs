@@ -7,9 +7,11 @@ use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
 use super::select::Selection;
-use super::weigh::{SLIGHT, completes, evidence, gain, lead, left_open, pursued, share};
+use super::weigh::{completes, evidence, gain, lead, left_open, pursued, share};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
+/// What a law explains more of the first misfit than a special case of it counts from this part on.
+const SLIGHT: f64 = 0.02;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
 /// Rivals that lose by less than this in one form are tried in all.

@@ -6,11 +6,11 @@ use super::forms::reformed;
 use super::free_run::{steadiest_first, strays};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::screen::Screened;
-use super::weigh::{SLIGHT, gain, lead, needed, needed_share, pursued, ranked, share, squares};
+use super::weigh::{gain, lead, needed, needed_share, pursued, ranked, squares};
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
 use crate::sim2real::identify::Effort;
-use crate::sim2real::{About, Candidate, Clock, Twin};
+use crate::sim2real::{About, Candidate, Twin};
 
 /// A mechanism must gain more than this to be added.
 pub(super) const ACCEPT: f64 = 10.0;
@@ -371,10 +371,6 @@ fn pruned<T: Twin>(
         if whole.added.is_empty() {
             return (bare.clone(), bare, Vec::new());
         }
-        if let Some(smaller) = without_special_case(inquiry, &bare, &whole) {
-            whole = better_of(inquiry, &bare, best_of_stage.pop(), smaller);
-            continue;
-        }
         // A set must be worth its size beside the best of one less, whether or not that is a part of it.
         if let Some(smaller) = best_of_stage.pop_if(|smaller| {
             smaller.added.len() + 1 == whole.added.len()
@@ -401,33 +397,11 @@ fn pruned<T: Twin>(
             .filter(|(_, gain, needed)| *gain <= ACCEPT || !needed)
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((weakest, _, _)) = weakest else { return (bare, whole, without) };
-        whole = better_of(inquiry, &bare, best_of_stage.pop(), without[weakest].clone());
+        let smaller = without[weakest].clone();
+        // Another set of that size, found on the way up, may have been the better one to keep.
+        whole = match best_of_stage.pop() {
+            Some(other) if lead(inquiry, &bare, &other, &smaller) > 0.0 => other,
+            _ => smaller,
+        };
     }
-}
-
-/// What is left of a larger set, or another set of that size found on the way up, which may have been the better one to keep.
-fn better_of<T: Twin>(
-    inquiry: &Inquiry<'_, T>,
-    bare: &Hypothesis<T>,
-    other: Option<Hypothesis<T>>,
-    smaller: Hypothesis<T>,
-) -> Hypothesis<T> {
-    other.filter(|other| lead(inquiry, bare, other, &smaller) > 0.0).unwrap_or(smaller)
-}
-
-/// The set without a law of which another in it is a general one, where that explains hardly less: beside its special case a law bends
-/// to anything, and what the two leave is no measure of what a further one is worth.
-fn without_special_case<T: Twin>(
-    inquiry: &Inquiry<'_, T>,
-    bare: &Hypothesis<T>,
-    whole: &Hypothesis<T>,
-) -> Option<Hypothesis<T>> {
-    if inquiry.twin.clock() == Clock::Event {
-        return None;
-    }
-    let about = |number: &usize| inquiry.candidates[*number].about;
-    let special = |number: &usize| whole.added.iter().any(|other| about(other).contains.contains(&about(number).name));
-    let place = whole.added.iter().position(special)?;
-    let less = inquiry.without(whole, place);
-    (share(bare, &less, whole) < SLIGHT).then_some(less)
 }

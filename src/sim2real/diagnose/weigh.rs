@@ -40,8 +40,6 @@ const NEXT_TO_NOTHING: f64 = 0.01;
 const INDIFFERENT: f64 = 3.0;
 /// What is told by how a recording begins alone counts no more than this: laws of what is elastic or loose hold least in the first moments.
 const FIRST_MOMENTS: f64 = 6.0;
-/// What a law explains more of the first misfit than a special case of it counts from this part on.
-pub(super) const SLIGHT: f64 = 0.02;
 /// Degrees of freedom of what a twin says of its parameters' uncertainty.
 const FREEDOM: f64 = 4.0;
 /// Numbers of effective residuals whose ratio is smaller than this differ by their own scatter.
