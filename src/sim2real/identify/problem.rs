@@ -85,7 +85,7 @@ pub(super) struct Piece {
     pub jacobian: DMatrix<f64>,
     pub initial_step: Vec<f64>,
     pub initial_by_parameter: DMatrix<f64>,
-    initial_std: Vec<f64>,
+    pub initial_std: Vec<f64>,
     initial_basis: DMatrix<f64>,
     pub objective: f64,
 }
