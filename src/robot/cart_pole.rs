@@ -159,11 +159,11 @@ impl Plant for CartPole {
         let pole = local(recording, "angle", "angular_velocity", row).unwrap_or_default();
         let recordings = std::slice::from_ref(recording);
         let moves = self.typical(recordings);
-        let turns = typical(recordings, "angle", "angular_velocity", 1.0).rate;
+        let turns = || typical(recordings, "angle", "angular_velocity", 1.0).rate;
         let wide = 0.3 * moves.output.max(1e-9);
         vec![
             Parameter::new("initial position", "m", cart.value).known_to(wide),
-            initial_rate("initial velocity", "m/s", &cart, row, moves.rate),
+            initial_rate("initial velocity", "m/s", &cart, row, || moves.rate),
             Parameter::new("initial angle", "rad", pole.value).known_to(0.1),
             initial_rate("initial angular velocity", "rad/s", &pole, row, turns),
         ]

@@ -81,11 +81,17 @@ pub(super) fn motion<S>(recording: &Recording<S>, channel: &str, rate: &str) -> 
     (0..recording.len()).map(|row| local(recording, channel, rate, row).unwrap_or_default()).collect()
 }
 
-/// The rate with which a recording begins, as its first samples have it; or that of the middle of one, from `row` on. A recording may
-/// well begin at rest, and otherwise at a rate of about `usual`.
-pub(super) fn initial_rate(name: &'static str, unit: &'static str, seen: &Estimate, row: usize, usual: f64) -> Parameter {
+/// The rate at `row`, where a recording or a window of it is followed from, as far as its samples tell. A recording may well begin at
+/// rest, and otherwise at a rate of about `usual`, which is asked for there alone; a window begins in the midst of motion.
+pub(super) fn initial_rate(
+    name: &'static str,
+    unit: &'static str,
+    seen: &Estimate,
+    row: usize,
+    usual: impl FnOnce() -> f64,
+) -> Parameter {
     let parameter = Parameter::new(name, unit, seen.rate).known_to(seen.rate_std.max(1e-9));
-    if row == 0 { parameter.at_rest_or_about(usual) } else { parameter }
+    if row == 0 { parameter.at_rest_or_about(usual()) } else { parameter }
 }
 
 /// Typical sizes of a plant whose first channel is `channel` with the rate `rate`, driven by `commands` [unit of the

@@ -171,7 +171,7 @@ impl Plant for Joint {
         let typical = self.typical(std::slice::from_ref(recording));
         vec![
             Parameter::new("initial position", "rad", estimate.value).known_to(0.3 * typical.output.max(1e-9)),
-            initial_rate("initial velocity", "rad/s", &estimate, row, typical.rate),
+            initial_rate("initial velocity", "rad/s", &estimate, row, || typical.rate),
         ]
     }
 

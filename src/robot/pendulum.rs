@@ -85,10 +85,10 @@ impl Plant for Pendulum {
 
     fn initial_parameters(&self, recording: &Recording<Commands>, row: usize) -> Vec<Parameter> {
         let estimate = local(recording, "angle", "angular_velocity", row).unwrap_or_default();
-        let typical = self.typical(std::slice::from_ref(recording));
+        let usual = || self.typical(std::slice::from_ref(recording)).rate;
         vec![
             Parameter::new("initial angle", "rad", estimate.value).known_to(0.3),
-            initial_rate("initial angular velocity", "rad/s", &estimate, row, typical.rate),
+            initial_rate("initial angular velocity", "rad/s", &estimate, row, usual),
         ]
     }
 

@@ -51,5 +51,8 @@ mod tests {
         rough.fit.state = State { initial: vec![vec![rate]], values: vec![vec![0.0]], misfit: 3.0 };
         rough.fit.initial_std = vec![vec![0.01]];
         assert!((rested(&rough) - (1.0 + 1.0 / 27e-4_f64).ln()).abs() < 1e-9);
+        // What the recording does not tell at all says nothing.
+        rough.fit.initial_std = vec![vec![f64::INFINITY]];
+        assert_eq!(rested(&rough), 0.0);
     }
 }

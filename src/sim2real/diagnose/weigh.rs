@@ -38,7 +38,8 @@ const NEXT_TO_NOTHING: f64 = 0.01;
 /// The evidence between two that say the same in as many constants is no more than this: of 45 names of five spent test seeds that were
 /// told apart by no more, 37 were right, and twice the logarithm of such odds is 3.
 const INDIFFERENT: f64 = 3.0;
-/// What is told by how a recording begins alone counts no more than this: laws of what is elastic or loose hold least in the first moments.
+/// How a recording begins counts no more than this, twice the logarithm of twenty: laws of what is elastic or loose hold least in the
+/// first moments.
 const FIRST_MOMENTS: f64 = 6.0;
 /// Degrees of freedom of what a twin says of its parameters' uncertainty.
 const FREEDOM: f64 = 4.0;
@@ -103,10 +104,10 @@ fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypot
 pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
     let by_own = plausibility(inquiry, &a.fit.values) - plausibility(inquiry, &b.fit.values);
     let evidence = evidence(inquiry, first, a, b);
-    // What says the same is told apart by its length alone.
     if !alike(inquiry, first, a, b) {
         return evidence + by_own;
     }
+    // What says the same is told apart by its length, and by whether it lets what rested begin at rest.
     let said = match b.free() as f64 - a.free() as f64 {
         0.0 => match ageing(inquiry, a).cmp(&ageing(inquiry, b)) {
             // What is the same at all times explains more than what happens to change as if it were.

@@ -404,3 +404,26 @@ fn rank(gram: &DMatrix<f64>) -> usize {
     let strongest = squared.iter().copied().fold(0.0, f64::max);
     squared.iter().filter(|s| **s > RANK_TOLERANCE * RANK_TOLERANCE * strongest && **s > 0.0).count()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_unsure_of_the_parameters_adds_to_initial_states() {
+        let evaluation = Evaluation {
+            residual: DVector::zeros(0),
+            jacobian: DMatrix::zeros(0, 0),
+            measured: 0,
+            initial_step: Vec::new(),
+            initial_by_parameter: vec![DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 1.0, 1.0])],
+            initial_std: vec![vec![3.0, f64::INFINITY]],
+            initial_basis: Vec::new(),
+            objective: 0.0,
+        };
+        // A step of 2 for each of the first parameter, which is known to 2.
+        let covariance = DMatrix::from_row_slice(2, 2, &[4.0, 1.0, 1.0, 9.0]);
+        assert_eq!(initial_std(&evaluation, Some(&covariance)), [[5.0, f64::INFINITY]]);
+        assert_eq!(initial_std(&evaluation, None), [[3.0, f64::INFINITY]]);
+    }
+}
