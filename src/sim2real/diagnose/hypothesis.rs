@@ -163,6 +163,16 @@ impl<T: Twin> Inquiry<'_, T> {
         self.weighed(twin, added, fit, &blocks)
     }
 
+    /// `hypothesis`, which was fitted to other rows of the same parts, and nothing of it fitted anew.
+    pub fn seen(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
+        let Hypothesis { twin, added, fit, .. } = hypothesis.clone();
+        let problem = self.problem(&twin, &self.evidence.compared);
+        let evaluation = problem.evaluate(&fit.values, &fit.state, &fit.free);
+        let blocks = problem.blocks();
+        let fit = Fit { residual: evaluation.residual, jacobian: evaluation.jacobian, ..fit };
+        self.weighed(twin, added, fit, &blocks)
+    }
+
     /// `hypothesis` refitted with this inquiry's step of integration, from where it stands.
     pub fn refitted(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
         let twin = hypothesis.added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]));

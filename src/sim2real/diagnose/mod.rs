@@ -17,6 +17,7 @@ mod by_recording;
 mod carry_over;
 mod changes;
 mod confidence;
+mod crossings;
 mod diagnosis;
 mod effects;
 mod evidence;
@@ -245,6 +246,10 @@ fn followed(
                 inquiry = in_windows;
             }
         }
+    }
+    if let Some((beneath, places)) = crossings::beneath(&inquiry, &selection, [recordings, held_out], found, progress) {
+        inquiry.evidence = &free_run;
+        (selection, rivals) = (beneath.seen(&inquiry), places);
     }
     selection.mark_accepted(&candidates);
     let selection = recognize::finished(&inquiry, selection, &mut rivals);

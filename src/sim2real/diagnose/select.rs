@@ -175,6 +175,16 @@ impl<T: Twin> Selection<T> {
         Self { scores, ..selection }
     }
 
+    /// This selection, nothing of it fitted anew, as another inquiry sees it.
+    pub fn seen(&self, inquiry: &Inquiry<'_, T>) -> Self {
+        Self {
+            recalibrated: inquiry.seen(&self.recalibrated),
+            selected: inquiry.seen(&self.selected),
+            without: self.without.iter().map(|less| inquiry.seen(less)).collect(),
+            scores: self.scores.clone(),
+        }
+    }
+
     /// The selection without its `place`-th mechanism.
     pub fn dropped(&self, inquiry: &Inquiry<'_, T>, place: usize) -> Self {
         let (recalibrated, selected, without) = pruned(inquiry, &self.recalibrated, vec![self.without[place].clone()]);
