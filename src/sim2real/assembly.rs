@@ -7,8 +7,8 @@ use std::sync::Arc;
 use super::follow::{Collected, Said};
 use super::run::Run;
 use super::{
-    About, Candidate, Channel, Clock, Controller, Covariate, Dynamics, Measured, Mechanism, Parameter, Plant, Recording,
-    Seed, Signs, Simulator, Site, Stimulus, Thetas, Trajectory, Twin, Typical,
+    About, Candidate, Channel, Clock, Controller, Covariate, Dynamics, Form, Measured, Mechanism, Parameter, Plant,
+    Recording, Seed, Signs, Simulator, Site, Stimulus, Thetas, Trajectory, Twin, Typical,
 };
 
 /// The mechanisms a domain knows: one row each.
@@ -316,6 +316,11 @@ impl<P: Plant> Assembly<P> {
     }
 }
 
+/// Lowest and highest value of each parameter of `form`.
+fn bounds(form: &Form) -> Vec<[f64; 2]> {
+    form.parameters.iter().map(|parameter| [parameter.lower, parameter.upper]).collect()
+}
+
 impl<P: Plant> Twin for Assembly<P> {
     fn candidates(&self, recordings: &[Recording<P::Stimulus>]) -> Vec<Candidate> {
         let typical = self.typical(recordings);
@@ -326,6 +331,7 @@ impl<P: Plant> Twin for Assembly<P> {
             if modelled.contains(&about.name) || self.excluded.iter().any(|id| id == about.name) {
                 continue;
             }
+            let widest = mechanism.forms(&typical);
             for (form_index, form) in mechanism.sought(&typical).into_iter().enumerate() {
                 let applies = |stimulus| {
                     self.plant.concerns(about.site, stimulus) && mechanism.applies(form_index, &self.plant, stimulus)
@@ -333,7 +339,9 @@ impl<P: Plant> Twin for Assembly<P> {
                 let known = recordings.iter().all(|r| applies(&r.stimulus));
                 if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
                     let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
-                    candidates.push(Candidate { about, form, form_index, finishing, general, ages: mechanism.ages() });
+                    let (ages, seldom) = (mechanism.ages(), mechanism.seldom());
+                    let bounds = bounds(&widest[form_index]);
+                    candidates.push(Candidate { about, form, form_index, finishing, general, ages, seldom, bounds });
                 }
             }
         }
@@ -367,8 +375,9 @@ impl<P: Plant> Twin for Assembly<P> {
             for (form_index, mut form) in mechanism.forms(&Default::default()).into_iter().enumerate() {
                 let Some(values) = mechanism.recognized(form_index, signs) else { continue };
                 form.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.nominal = value);
-                let (about, ages) = (mechanism.about(), mechanism.ages());
-                found.push(Candidate { about, form, form_index, finishing: false, general: false, ages });
+                let (about, ages, seldom) = (mechanism.about(), mechanism.ages(), mechanism.seldom());
+                let (finishing, general, bounds) = (false, false, bounds(&form));
+                found.push(Candidate { about, form, form_index, finishing, general, ages, seldom, bounds });
             }
         }
         found

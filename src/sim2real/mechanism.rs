@@ -161,12 +161,18 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn finishing(&self, _form: usize) -> bool {
         false
     }
-    /// Whether form `form` is a wider law of which a plainer form is one case: tried only in the place of that, where it does best.
+    /// Whether form `form` is a wider law of which a plainer form is one case: tried only in the place of that, where it does best. Its
+    /// first parameters are those of that form, in their order.
     fn general(&self, _form: usize) -> bool {
         false
     }
     /// Whether its law is another one at another time, whatever the plant does meanwhile.
     fn ages(&self) -> bool {
+        false
+    }
+    /// Whether its law is met less often by itself than others are: one that leaves out what others of its kind begin with, so that what
+    /// these are off by looks like it.
+    fn seldom(&self) -> bool {
         false
     }
     /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.

@@ -115,6 +115,10 @@ pub struct Candidate {
     pub general: bool,
     /// Whether its law is another one at another time, whatever the plant does meanwhile.
     pub ages: bool,
+    /// Whether its law is met less often by itself than others are.
+    pub seldom: bool,
+    /// Lowest and highest value that each of its parameters may have at all, beyond what goes by its name.
+    pub bounds: Vec<[f64; 2]>,
 }
 
 /// A simulator that can be given mechanisms it lacks.

@@ -11,7 +11,9 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// In the form `gap`, a motor with `motor_share` of the inertia, driven by the command and damped by the joint's viscous
 /// friction, moves the link only where it touches it, at either end of `gap`; in the form `gap_friction` the motor has dry
 /// friction of its own as well. The touch is stiff: 160 Hz for motor and link against each other, and critically damped. In
-/// the form `gap_spring` it gives: by `stiffness`, with a damper of `damping_ratio` times the critical damping of the two.
+/// the form `gap_spring` it gives: by `stiffness`, with a damper of `damping_ratio` times the critical damping of the two. At first
+/// the motor touches the link on the side that carries the load, or is in the middle of the gap where the link rests and the motor does
+/// not hold it up.
 ///
 /// Source: Tao & Kokotović, *Adaptive Control of Systems with Actuator and Sensor Nonlinearities* (1996), chapter 2 (play);
 /// Nordin & Gutman, "Controlling mechanical systems with backlash: a survey", Automatica 38 (2002), section 2 (gap).
@@ -21,6 +23,10 @@ pub struct Backlash;
 /// Natural frequency of motor and link against each other while they touch [rad/s]: 160 Hz, above what position sensors
 /// see, below what makes a bounce of one step.
 const TOUCH: f64 = 1_000.0;
+/// A link that takes longer than this [s] to come as far as the gap is wide rests.
+const RESTS: f64 = 0.1;
+/// What pulls at a link is held up by a drive against it that is no smaller and no larger than by this factor.
+const HELD: f64 = 2.0;
 /// Damping of the touch over critical damping: gears rattle, but do not ring.
 const TOUCH_DAMPING: f64 = 1.0;
 
@@ -158,10 +164,11 @@ impl<P: Mover> Law<P> for Gap {
                     motor
                 }
                 None => {
-                    // At first it leans on the side that carries the load.
-                    let load = -as_one(*share, P::external(scene.dynamics, lane, state, link.position), drive);
-                    let lean = if load == 0.0 { 0.0 } else { load / wall.stiffness + load.signum() * 0.5 * gap };
-                    motor.insert(SecondMass::starting(Motion { position: link.position + lean, ..link }))
+                    let external = P::external(scene.dynamics, lane, state, link.position);
+                    let load = -as_one(*share, external, drive);
+                    let leans = load != 0.0 && leans(link.velocity, *gap, [drive, external]);
+                    let away = if leans { load / wall.stiffness + load.signum() * 0.5 * gap } else { 0.0 };
+                    motor.insert(SecondMass::starting(Motion { position: link.position + away, ..link }))
                 }
             };
             let coupling = touch(&wall, motor.motion, link, 0.5 * gap, tick.step);
@@ -173,6 +180,14 @@ impl<P: Mover> Law<P> for Gap {
             push.damping -= damping;
         }
     }
+}
+
+/// Whether the motor leans at first on the side that carries the load: where the link moves, or rests because the motor holds it up. What
+/// rests for another reason has left the motor somewhere in the gap, and the middle is nearest to wherever that is.
+#[inline]
+fn leans(velocity: f64, gap: f64, [drive, external]: [f64; 2]) -> bool {
+    let held = drive * external < 0.0 && (1.0 / HELD..=HELD).contains(&(drive / external).abs());
+    held || velocity.abs() * RESTS > gap
 }
 
 /// How motor and link touch in a step of `step` [s], free to move by `half` [rad] either way.
@@ -221,16 +236,33 @@ mod tests {
     #[test]
     fn the_link_waits_until_the_motor_has_crossed_the_gap() {
         let (gap, share, drive) = (0.05, 0.4, 0.2);
-        // It leans on the one side and pushes; then the drive turns round.
+        // Under way it leans on the one side and pushes; then the drive turns round.
         let commands: Vec<f64> = (0..1_000).map(|k| if k < 300 { drive } else { -drive }).collect();
-        let motion = TRIAL.follow(&Backlash, 1, &[gap, share], &commands);
+        let trial = Trial { velocity: 0.5, ..TRIAL };
+        let motion = trial.follow(&Backlash, 1, &[gap, share], &commands);
         // Pushed together, both have the drive over the whole inertia.
-        assert!((motion[300].velocity / (drive / 0.1 * 0.3) - 1.0).abs() < 1e-3, "{}", motion[300].velocity);
+        let gained = motion[300].velocity - 0.5;
+        assert!((gained / (drive / 0.1 * 0.3) - 1.0).abs() < 1e-3, "{gained}");
         let free = (2.0 * gap * share * 0.1 / drive).sqrt();
         let still = 300 + (free / 1e-3) as usize;
         let coasting = motion[310].velocity;
         assert!(motion[310..still - 1].iter().all(|m| (m.velocity - coasting).abs() < 1e-12));
         assert!(motion[still + 4].velocity < coasting - 0.05, "no touch {} s after the turn", free + 4e-3);
+    }
+
+    /// A link that rests and is not held up by its motor has it in the middle of the gap, of which it has half to cross.
+    #[test]
+    fn a_motor_that_holds_nothing_up_begins_in_the_middle() {
+        let (gap, share, drive) = (0.05, 0.4, 0.2);
+        let motion = TRIAL.follow(&Backlash, 1, &[gap, share], &[drive; 300]);
+        let first = motion.iter().position(|m| m.velocity > 1e-6).unwrap();
+        let free = (gap * share * 0.1 / drive).sqrt();
+        assert!((first as f64 * 1e-3 - free).abs() < 3e-3, "{first} ms, {free} s");
+        // One that holds a weight up touches it.
+        let weight = 2.0;
+        let held = Trial { parameters: [0.1, 0.0, weight, 1.0], position: std::f64::consts::FRAC_PI_2, ..TRIAL };
+        let motion = held.follow(&Backlash, 1, &[gap, share], &[weight; 300]);
+        assert!(motion.iter().all(|m| (m.position - held.position).abs() < 2e-3), "{:?}", motion[299]);
     }
 
     /// What is shared in contacts is shared by the masses: no momentum is lost or made.

@@ -6,7 +6,8 @@ use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `sine sin(counts q) + cosine cos(counts q)`; in the form `per_length`, of a linear axis, with `wave_number` for
-/// `counts`.
+/// `counts`. In the forms that end in `_harmonics` there is a wave of half the length too, `second_sine sin(2 counts q) + second_cosine
+/// cos(2 counts q)`.
 ///
 /// Source: Hanselman, *Brushless Permanent Magnet Motor Design* (2003), chapter 4: cogging repeats with the least common
 /// multiple of slots and poles; 4 to 200 times a turn in motors as they are built, times the ratio of a gear behind them.
@@ -41,23 +42,34 @@ impl<P: Mover> Mechanism<P> for Cogging {
         let waves = TAU / (typical.range[1] - typical.range[0]).max(1e-9);
         let numbers: Vec<f64> = (2..=WAVES).map(|n| f64::from(n) * waves).collect();
         let number = Parameter::new("wave_number", "1/rad", waves).within(0.5 * waves.min(1.0), f64::INFINITY);
-        let counts = Parameter::new("counts", "", 3.5).within(3.0, f64::INFINITY);
+        let counts = Parameter::new("counts", "", 3.5).within(3.0, f64::INFINITY).starting_at(&COUNTS);
+        let number = number.starting_at(&numbers);
+        let waves = |number: &Parameter| vec![amplitude("sine"), amplitude("cosine"), number.clone()];
+        let harmonics = |number: &Parameter| -> Vec<Parameter> {
+            let second = ["second_sine", "second_cosine"].map(amplitude);
+            waves(number).into_iter().chain(second).collect()
+        };
         vec![
-            Form { name: "per_turn", parameters: vec![amplitude("sine"), amplitude("cosine"), counts.starting_at(&COUNTS)] },
-            Form {
-                name: "per_length",
-                parameters: vec![amplitude("sine"), amplitude("cosine"), number.starting_at(&numbers)],
-            },
+            Form { name: "per_turn", parameters: waves(&counts) },
+            Form { name: "per_length", parameters: waves(&number) },
+            Form { name: "per_turn_harmonics", parameters: harmonics(&counts) },
+            Form { name: "per_length_harmonics", parameters: harmonics(&number) },
         ]
+    }
+
+    fn general(&self, form: usize) -> bool {
+        form >= 2
     }
 
     fn applies(&self, form: usize, plant: &P, _stimulus: &P::Stimulus) -> bool {
         let turns = Plant::unit(plant, "rad") == "rad";
-        turns == (form == 0)
+        turns == form.is_multiple_of(2)
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Teeth { sine: thetas.row(0).to_vec(), cosine: thetas.row(1).to_vec(), number: thetas.row(2).to_vec() })
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let row = |k| thetas.row(k).to_vec();
+        let teeth = Teeth { sine: row(0), cosine: row(1), number: row(2) };
+        if form < 2 { Box::new(teeth) } else { Box::new(Harmonics { teeth, sine: row(3), cosine: row(4) }) }
     }
 }
 
@@ -83,6 +95,35 @@ impl<P: Mover> Law<P> for Teeth {
             }
             let motion = P::motion(state);
             let (s, c) = (number * (motion.position + 0.5 * tick.step * motion.velocity)).sin_cos();
+            P::push(effect).effort += sine * s + cosine * c;
+        }
+    }
+}
+
+/// Teeth with a wave of half their length besides.
+#[derive(Clone)]
+struct Harmonics {
+    teeth: Teeth,
+    sine: Vec<f64>,
+    cosine: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for Harmonics {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        Law::<P>::change(&mut self.teeth, change);
+        change.parameter(3, &mut self.sine);
+        change.parameter(4, &mut self.cosine);
+    }
+
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.teeth.act(tick, scene, effects);
+        let parameters = self.sine.iter().zip(&self.cosine).zip(&self.teeth.number);
+        for ((effect, state), ((sine, cosine), number)) in effects.iter_mut().zip(scene.states).zip(parameters) {
+            if *sine == 0.0 && *cosine == 0.0 {
+                continue;
+            }
+            let motion = P::motion(state);
+            let (s, c) = (2.0 * number * (motion.position + 0.5 * tick.step * motion.velocity)).sin_cos();
             P::push(effect).effort += sine * s + cosine * c;
         }
     }
@@ -114,23 +155,29 @@ mod tests {
     fn it_is_a_potential() {
         let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.1, velocity: 2.0, step: 1e-3 };
         let (sine, cosine, counts) = (0.05, -0.02, 24.0);
-        let motion = trial.follow(&Cogging, 0, &[sine, cosine, counts], &vec![0.0; 5_000]);
-        let energy = |m: &crate::robot::Motion| {
-            let (s, c) = (counts * m.position).sin_cos();
-            0.05 * m.velocity * m.velocity + (sine * c - cosine * s) / counts
-        };
-        let first = energy(&motion[0]);
-        assert!(motion.iter().all(|m| (energy(m) / first - 1.0).abs() < 1e-3));
-        let fastest = motion.iter().map(|m| m.velocity).fold(0.0, f64::max);
-        assert!(fastest > 2.005, "{fastest}");
+        for (form, second) in [(0, [0.0, 0.0]), (2, [-0.02, 0.03])] {
+            let parameters = [sine, cosine, counts, second[0], second[1]];
+            let motion = trial.follow(&Cogging, form, &parameters[..if form == 0 { 3 } else { 5 }], &vec![0.0; 5_000]);
+            let energy = |m: &crate::robot::Motion| {
+                let (s, c) = (counts * m.position).sin_cos();
+                let (s2, c2) = (2.0 * counts * m.position).sin_cos();
+                let waves = sine * c - cosine * s + 0.5 * (second[0] * c2 - second[1] * s2);
+                0.05 * m.velocity * m.velocity + waves / counts
+            };
+            let first = energy(&motion[0]);
+            assert!(motion.iter().all(|m| (energy(m) / first - 1.0).abs() < 1e-3), "form {form}");
+            let fastest = motion.iter().map(|m| m.velocity).fold(0.0, f64::max);
+            assert!(fastest > 2.005, "{fastest}");
+        }
     }
 
     #[test]
     fn what_turns_has_counts_and_what_slides_a_wave_number() {
         for (axis, form) in [(Axis::Rotary, 0), (Axis::Linear, 1)] {
             let joint = Joint::new(axis, [1.0; 4], [0.1; 4]);
-            for other in [0, 1] {
-                assert_eq!(Mechanism::<Joint>::applies(&Cogging, other, &joint, &Commands::default()), form == other);
+            for other in 0..4 {
+                let applies = Mechanism::<Joint>::applies(&Cogging, other, &joint, &Commands::default());
+                assert_eq!(applies, form == other % 2, "form {other}");
             }
         }
     }

@@ -8,14 +8,15 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 ///
 /// In the form `creeping`, it creeps while it holds, as contacts of rigid-body engines do
 /// ([`Push::creeping_friction`](crate::robot::Push)); in the form `smooth` it is `-smooth_torque tanh(v / velocity)` and holds
-/// nothing; in the form `presliding` it gives before it slips, and is `presliding_torque w` with `w' = (v - |v| w) /
-/// presliding_angle`: what bends further before it slips is a [`Hysteresis`].
+/// nothing; in the form `presliding` it gives before it slips, and is `presliding_torque w` with `w' = (v - |v| w / 2 - v |w| / 2) /
+/// presliding_angle`, elastic while it comes back: what bends further before it slips is a [`Hysteresis`].
 ///
 /// Source: Coulomb, *Théorie des machines simples* (1785); Armstrong-Hélouvry, Dupont & Canudas de Wit, "A survey of
 /// models, analysis tools and compensation methods for the control of machines with friction", Automatica 30 (1994);
 /// creeping: Todorov, "Convex and analytically invertible dynamics with contacts and constraints", ICRA 2014; smooth:
 /// Andersson, Söderberg & Björklund, "Friction models for sliding dry, boundary and mixed lubricated contacts", Tribology
-/// International 40 (2007); presliding: Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14 (1976).
+/// International 40 (2007); presliding: Dahl, "Solid friction damping of mechanical vibrations", AIAA Journal 14 (1976), with the
+/// unloading of Wen (1976), as of a [`Hysteresis`] that is soft.
 #[derive(Debug, Clone, Copy)]
 pub struct CoulombFriction;
 
@@ -46,34 +47,22 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
         let velocity = Parameter::new("velocity", "rad/s", rate)
             .within(1e-4 * rate.min(1.0), f64::INFINITY)
             .starting_at(&[0.02, 0.2].map(|fraction| fraction * rate));
-        let output = typical.output.max(1e-9);
-        let angle = Parameter::new("presliding_angle", "rad", 0.05 * output)
-            .within(LEAST_ANGLE, f64::INFINITY)
-            .starting_at(&[0.01 * output]);
         vec![
             Form { name: "dry", parameters: vec![torque("torque")] },
             Form { name: "creeping", parameters: vec![torque("creeping_torque")] },
             Form { name: "smooth", parameters: vec![torque("smooth_torque"), velocity] },
-            Form { name: "presliding", parameters: vec![torque("presliding_torque"), angle] },
+            Form { name: "presliding", parameters: vec![torque("presliding_torque"), presliding_angle(typical)] },
         ]
     }
 
     /// A friction that gives over more than a small part of the motion, or that grows with velocity over more than a small part of what
     /// is usual, goes by another name.
     fn sought(&self, typical: &Typical) -> Vec<Form> {
-        let mut forms = Mechanism::<P>::forms(self, typical);
-        for parameter in forms.iter_mut().flat_map(|form| &mut form.parameters) {
-            match parameter.name.as_ref() {
-                "presliding_angle" => {
-                    (parameter.lower, parameter.upper) = (1e-4 * typical.output.min(1.0), PRESLIDING * typical.output);
-                }
-                "velocity" => {
-                    parameter.upper = (CORNER * typical.rate).max(parameter.lower);
-                    parameter.nominal = (0.2 * parameter.upper).max(parameter.lower);
-                    parameter.starts = vec![parameter.nominal];
-                }
-                _ => {}
-            }
+        let mut forms = hardly_giving(Mechanism::<P>::forms(self, typical), typical);
+        for parameter in forms.iter_mut().flat_map(|form| &mut form.parameters).filter(|p| p.name == "velocity") {
+            parameter.upper = (CORNER * typical.rate).max(parameter.lower);
+            parameter.nominal = (0.2 * parameter.upper).max(parameter.lower);
+            parameter.starts = vec![parameter.nominal];
         }
         forms
     }
@@ -83,11 +72,24 @@ impl<P: Mover> Mechanism<P> for CoulombFriction {
         match form {
             0 => Box::new(Dry(torque)),
             1 => Box::new(Creeping(torque)),
-            // Dahl's law is that of a soft loop.
             3 => Hysteresis.law(0, thetas, seed),
             _ => Box::new(Smooth { torque, velocity: thetas.row(1).to_vec() }),
         }
     }
+}
+
+/// The angle over which dry friction gives before it slips [rad].
+pub(super) fn presliding_angle(typical: &Typical) -> Parameter {
+    let output = typical.output.max(1e-9);
+    Parameter::new("presliding_angle", "rad", 0.05 * output).within(LEAST_ANGLE, f64::INFINITY).starting_at(&[0.01 * output])
+}
+
+/// `forms` in which dry friction gives over no more than a small part of the motion.
+pub(super) fn hardly_giving(mut forms: Vec<Form>, typical: &Typical) -> Vec<Form> {
+    for angle in forms.iter_mut().flat_map(|form| &mut form.parameters).filter(|p| p.name == "presliding_angle") {
+        (angle.lower, angle.upper) = (1e-4 * typical.output.min(1.0), PRESLIDING * typical.output);
+    }
+    forms
 }
 
 #[derive(Clone)]

@@ -29,6 +29,11 @@ impl<P: Mover> Mechanism<P> for CubicStiffness {
         ])
     }
 
+    /// Springs that harden have a rate at rest too; and what is straight hardens a little.
+    fn seldom(&self) -> bool {
+        true
+    }
+
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         Box::new(Spring(thetas.row(0).to_vec()))
     }

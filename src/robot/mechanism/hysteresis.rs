@@ -1,6 +1,7 @@
 //! A restoring torque that remembers where it came from: bending cables, rubber, presliding in gears.
 
 use super::coulomb_friction::PRESLIDING;
+use super::drawn::{Drawn, moved, sharp, soft};
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
@@ -63,8 +64,7 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let loops =
-            Loops { torque: thetas.row(0).to_vec(), angle: thetas.row(1).to_vec(), memory: vec![None; thetas.lanes()] };
+        let loops = Loops { torque: thetas.row(0).to_vec(), drawn: Drawn::new(thetas.row(1)) };
         match form {
             0 => Box::new(Soft(loops)),
             1 => Box::new(Sharp(loops)),
@@ -82,71 +82,21 @@ fn shape() -> [Parameter; 2] {
     ]
 }
 
-/// Where a lane was in the middle of its last step [rad], and how far its loop was drawn, from -1 to 1.
-#[derive(Debug, Clone, Copy)]
-struct Drawn {
-    position: f64,
-    level: f64,
-}
-
 #[derive(Clone)]
 struct Loops {
     torque: Vec<f64>,
-    angle: Vec<f64>,
-    memory: Vec<Option<Drawn>>,
+    drawn: Drawn,
 }
 
 impl Loops {
     fn change(&mut self, change: &LaneChange<'_>) {
         change.parameter(0, &mut self.torque);
-        change.parameter(1, &mut self.angle);
-        change.memory(&mut self.memory);
+        self.drawn.change(1, change);
     }
-
-    /// `drawn_by` gives the level of a lane after a way in units of the yield angle.
-    fn pull<P: Mover>(
-        &mut self,
-        tick: Tick,
-        scene: &Scene<'_, P>,
-        effects: &mut [P::Effect],
-        drawn_by: impl Fn(usize, f64, f64) -> f64,
-    ) {
-        let parameters = self.torque.iter().zip(&self.angle).zip(&mut self.memory);
-        let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();
-        for (lane, ((effect, state), ((torque, angle), memory))) in lanes {
-            if *torque <= 0.0 {
-                continue;
-            }
-            let motion = P::motion(state);
-            let midway = motion.position + 0.5 * tick.step * motion.velocity;
-            // It must not be stiffer than a step can follow: by then it is dry friction in all but name.
-            let least = torque * tick.step * tick.step / P::inertia(scene.dynamics, lane, state);
-            let drawn = memory.get_or_insert(Drawn { position: motion.position, level: 0.0 });
-            drawn.level = drawn_by(lane, drawn.level, (midway - drawn.position) / angle.max(least));
-            drawn.position = midway;
-            P::push(effect).effort -= torque * drawn.level;
-        }
-    }
-}
-
-/// The level after a way in units of the yield angle: elastic back to 0, and from there on loading, which `loaded` does from a
-/// level of at least 0.
-#[inline]
-fn moved(level: f64, way: f64, loaded: impl Fn(f64, f64) -> f64) -> f64 {
-    let back = if level * way < 0.0 { way.abs().min(level.abs()) } else { 0.0 };
-    let level = level + way.signum() * back;
-    let further = way.abs() - back;
-    if further > 0.0 { way.signum() * loaded(level.abs(), further) } else { level }
 }
 
 #[derive(Clone)]
 struct Soft(Loops);
-
-/// `dw = (1 - w) dx`, exactly.
-#[inline]
-fn soft(level: f64, way: f64) -> f64 {
-    1.0 - (1.0 - level) * (-way).exp()
-}
 
 impl<P: Mover> Law<P> for Soft {
     fn change(&mut self, change: &LaneChange<'_>) {
@@ -154,20 +104,13 @@ impl<P: Mover> Law<P> for Soft {
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        self.0.pull(tick, scene, effects, |_, level, way| moved(level, way, soft));
+        let Loops { torque, drawn } = &mut self.0;
+        drawn.pull(tick, scene, effects, torque, |_, level, way| moved(level, way, soft));
     }
 }
 
 #[derive(Clone)]
 struct Sharp(Loops);
-
-/// `dw = (1 - w^2) dx`, exactly: `tanh(artanh(level) + way)`, by one exponential.
-#[inline]
-fn sharp(level: f64, way: f64) -> f64 {
-    let left = (-2.0 * way).exp();
-    let (sum, difference) = (1.0 + left, 1.0 - left);
-    (level * sum + difference) / (sum + level * difference)
-}
 
 impl<P: Mover> Law<P> for Sharp {
     fn change(&mut self, change: &LaneChange<'_>) {
@@ -175,7 +118,8 @@ impl<P: Mover> Law<P> for Sharp {
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        self.0.pull(tick, scene, effects, |_, level, way| moved(level, way, sharp));
+        let Loops { torque, drawn } = &mut self.0;
+        drawn.pull(tick, scene, effects, torque, |_, level, way| moved(level, way, sharp));
     }
 }
 
@@ -195,7 +139,8 @@ impl<P: Mover> Law<P> for BoucWen {
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let (exponent, sigma) = (&self.exponent, &self.sigma);
-        self.loops.pull(tick, scene, effects, |lane, level, way| bent(level, way, exponent[lane], sigma[lane]));
+        let Loops { torque, drawn } = &mut self.loops;
+        drawn.pull(tick, scene, effects, torque, |lane, level, way| bent(level, way, exponent[lane], sigma[lane]));
     }
 }
 

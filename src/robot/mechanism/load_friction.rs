@@ -1,5 +1,7 @@
 //! Dry friction of gears, which grows with the load they carry.
 
+use super::coulomb_friction::{hardly_giving, presliding_angle};
+use super::drawn::{Drawn, moved, soft};
 use super::stribeck_friction::falling;
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
@@ -7,10 +9,12 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// Dry friction of `torque + load |drive - external|`, where `drive` is the motor's effort and `external` that of gravity;
 /// in the form `stribeck`, `torque + load |drive - external| + exp(-(v / stribeck_velocity)^2) (excess + load_excess |drive -
 /// external|)`; in the form `directional`, `torque + |motor_load drive - external_load external|`, as where gears pass a
-/// load on more easily one way than the other.
+/// load on more easily one way than the other. In the form `presliding` the gears give before they slip: the first of these times `w`
+/// with `w' = (v - |v| w / 2 - v |w| / 2) / presliding_angle`.
 ///
 /// Source: Duclusaud, Passault, Padois & Ly, "Extended friction models for the physics simulation of servo actuators",
-/// arXiv 2410.08650 (2024): models M3 and M4, and the direction of M5 (there with Stribeck's effect).
+/// arXiv 2410.08650 (2024): models M3 and M4, and the direction of M5 (there with Stribeck's effect); presliding: Dahl, "Solid friction
+/// damping of mechanical vibrations", AIAA Journal 14 (1976), with the unloading of Wen (1976).
 #[derive(Debug, Clone, Copy)]
 pub struct LoadFriction;
 
@@ -57,7 +61,19 @@ impl<P: Mover> Mechanism<P> for LoadFriction {
                     loads("external_load", &[0.05, 0.2]),
                 ],
             },
+            Form {
+                name: "presliding",
+                parameters: vec![torques("torque", 0.05), loads("load", &[0.05, 0.2]), presliding_angle(typical)],
+            },
         ]
+    }
+
+    fn sought(&self, typical: &Typical) -> Vec<Form> {
+        hardly_giving(Mechanism::<P>::forms(self, typical), typical)
+    }
+
+    fn general(&self, form: usize) -> bool {
+        form == 3
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
@@ -69,7 +85,12 @@ impl<P: Mover> Mechanism<P> for LoadFriction {
                 sticking: Gears { torque: row(2), motor: row(3), external: row(3) },
                 velocity: row(4),
             }),
-            _ => Box::new(Gears { torque: row(0), motor: row(1), external: row(2) }),
+            2 => Box::new(Gears { torque: row(0), motor: row(1), external: row(2) }),
+            _ => Box::new(GivingGears {
+                gears: Gears { torque: row(0), motor: row(1), external: row(1) },
+                drawn: Drawn::new(thetas.row(2)),
+                level: vec![0.0; thetas.lanes()],
+            }),
         }
     }
 }
@@ -160,6 +181,30 @@ impl<P: Mover> Law<P> for StribeckGears {
     }
 }
 
+/// Gears that give before they slip.
+#[derive(Clone)]
+struct GivingGears {
+    gears: Gears,
+    drawn: Drawn,
+    /// Friction once they slip, under the load of each lane [N m].
+    level: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for GivingGears {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.gears.change_of(change, [0, 1, 1]);
+        self.drawn.change(2, change);
+    }
+
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        for (lane, (level, state)) in self.level.iter_mut().zip(scene.states).enumerate() {
+            let (drive, external) = efforts(tick, scene, lane, state);
+            *level = self.gears.friction(lane, drive, external);
+        }
+        self.drawn.pull(tick, scene, effects, &self.level, |_, level, way| moved(level, way, soft));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,9 +214,13 @@ mod tests {
     #[test]
     fn without_gravity_it_takes_a_share_of_the_drive() {
         let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
-        for (form, values) in [(0, vec![0.0, 0.2]), (1, vec![0.0, 0.2, 0.0, 0.0, 1.0]), (2, vec![0.0, 0.2, 0.7])] {
+        for (form, values) in
+            [(0, vec![0.0, 0.2]), (1, vec![0.0, 0.2, 0.0, 0.0, 1.0]), (2, vec![0.0, 0.2, 0.7]), (3, vec![0.0, 0.2, 1e-9])]
+        {
             let motion = trial.follow(&LoadFriction, form, &values, &[0.5; 1_001]);
-            assert!((motion[1_000].velocity - 0.5 * 0.8 / 0.1).abs() < 1e-9, "form {form}");
+            // What gives moves a step farther before it slips.
+            let slack = if form == 3 { 0.5 * 0.2 / 0.1 * 3e-3 } else { 1e-9 };
+            assert!((motion[1_000].velocity - 0.5 * 0.8 / 0.1).abs() < slack, "form {form}");
         }
     }
 
@@ -200,5 +249,16 @@ mod tests {
                 assert!(if way == 0.0 { moved == 0.0 } else { moved * way > 1e-5 }, "form {form}, {drive}: {moved}");
             }
         }
+    }
+
+    /// Pushed by less than what moves them, gears give as far as the law has it, and come back when they are let go.
+    #[test]
+    fn gears_give_before_they_slip() {
+        let trial = Trial { parameters: [0.1, 0.05, 0.0, 1.0], position: 0.3, velocity: 0.0, step: 1e-3 };
+        let ramp: Vec<f64> = (0..60_000).map(|k| 0.1 * f64::from(k) / 60_000.0).collect();
+        let held = trial.follow(&LoadFriction, 3, &[0.15, 0.5, 0.05], &ramp)[59_999].position;
+        // 0.1 against 0.15 + 0.5 x 0.1.
+        let way = 0.05 * 2.0_f64.ln();
+        assert!((held - 0.3 - way).abs() < 1e-4, "{held}, {}", 0.3 + way);
     }
 }

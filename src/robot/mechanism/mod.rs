@@ -6,6 +6,7 @@ mod compliance;
 mod constant_load;
 mod coulomb_friction;
 mod cubic_stiffness;
+mod drawn;
 mod end_stop;
 mod hysteresis;
 mod load_friction;

@@ -27,6 +27,10 @@ const BY_EDGE: f64 = -2.1;
 /// twice the logarithm of their density.
 const BY_IMPLAUSIBILITY: f64 = -0.40;
 const USUAL: f64 = 6.0;
+/// Beyond these log odds each one more counts for so many: of names said to be 90 to 98 % sure by what is above, on development seeds 51,
+/// 61 and 62, all but one in a hundred were right.
+const SURE: f64 = 1.73;
+const SURER: f64 = 1.6;
 /// Nothing that is fitted is surer than this.
 const SUREST: f64 = 0.99;
 
@@ -54,6 +58,7 @@ pub(super) fn calibrated(place: &Place, doubts: &Doubts) -> (f64, Vec<f64>) {
         + BY_OTHERS * doubts.others as f64
         + BY_EDGE * doubts.at_edge as f64
         + BY_IMPLAUSIBILITY * (doubts.implausibility - USUAL).max(0.0);
+    let odds = odds + (SURER - 1.0) * (odds - SURE).max(0.0);
     let one_of_them = 1.0 / (1.0 + (-odds).exp());
     // A name and its rivals share what is sure of them by their evidence: of two that explain the same neither is surer.
     let (own, others) = by_evidence(place);

@@ -175,17 +175,23 @@ impl<T: Twin> Inquiry<'_, T> {
 
     /// `hypothesis` refitted with this inquiry's step of integration, from where it stands.
     pub fn refitted(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
-        let twin = hypothesis.added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]));
-        self.fitted(
-            twin,
-            hypothesis.added.clone(),
-            std::slice::from_ref(&hypothesis.fit.values),
-            Some(&hypothesis.fit.state),
-            Effort::Thorough,
-        )
+        self.followed_on(hypothesis, Effort::Thorough)
     }
 
-    /// The same where the recordings are divided in another way than they were for `hypothesis`.
+    /// The same, as far as `effort` goes.
+    pub fn followed_on(&self, hypothesis: &Hypothesis<T>, effort: Effort) -> Hypothesis<T> {
+        let twin = hypothesis.added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]));
+        let start = std::slice::from_ref(&hypothesis.fit.values);
+        self.fitted(twin, hypothesis.added.clone(), start, Some(&hypothesis.fit.state), effort)
+    }
+
+    /// `hypothesis` refitted with a `twin` of the same parameters, which may have other bounds.
+    pub fn followed_as(&self, twin: T, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
+        let start = std::slice::from_ref(&hypothesis.fit.values);
+        self.fitted(twin, hypothesis.added.clone(), start, Some(&hypothesis.fit.state), Effort::Thorough)
+    }
+
+    /// `hypothesis` refitted where the recordings are divided in another way than they were for it.
     pub fn refitted_afresh(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
         let start = std::slice::from_ref(&hypothesis.fit.values);
         self.fitted(hypothesis.twin.clone(), hypothesis.added.clone(), start, None, Effort::Thorough)

@@ -13,6 +13,7 @@
 
 mod activity;
 mod aspects;
+mod beyond;
 mod by_recording;
 mod carry_over;
 mod changes;
@@ -29,6 +30,7 @@ mod free_run;
 mod gates;
 mod hypothesis;
 mod locate;
+mod needed;
 mod noise;
 mod onset;
 mod profile;
@@ -280,6 +282,7 @@ fn followed(
         trued: known.clone(),
         sampled: twin.clock() != Clock::Event,
         inexact: exact::inexact(&inquiry, &selection),
+        beyond: beyond::goes_on(&inquiry, &selection),
     };
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
     // What the fit has named already need not be recognized besides.

@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use super::carry_over::carries_over;
 use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::needed::{completes, share};
 use super::screen::Screened;
 use super::select::Selection;
-use super::weigh::{completes, evidence, gain, lead, left_open, pursued, share};
+use super::weigh::{evidence, gain, lead, left_open, pursued};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
@@ -136,7 +137,7 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
                 };
                 tried.par_iter().map(one).collect()
             };
-            let mut others = losses(likely(inquiry, selection, &screened));
+            let mut others = losses(likely(inquiry, selection, &screened, *own));
             others.extend(losses(further_forms(inquiry, &screened, &others)));
             best_forms(inquiry, &mut others);
             let nearest = others.iter().map(|(_, loss)| *loss).filter(|loss| loss.is_finite()).min_by(f64::total_cmp);
@@ -145,8 +146,18 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
         .collect()
 }
 
-/// The mechanisms that may be rivals among what was screened, each in the form that looks best.
-fn likely<'s, T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, screened: &'s [Screened]) -> Vec<&'s Screened> {
+/// The mechanisms that may be rivals of candidate `own` among what was screened, each in the form that looks best: the likeliest, and
+/// those of which one is a special case of the other, whatever screening, which sees how they begin, says of them.
+fn likely<'s, T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    selection: &Selection<T>,
+    screened: &'s [Screened],
+    own: usize,
+) -> Vec<&'s Screened> {
+    let kin = |one: &Screened| {
+        let (own, other) = (inquiry.candidates[own].about, inquiry.candidates[one.number].about);
+        own.contains.contains(&other.name) || other.contains.contains(&own.name)
+    };
     let name = |one: &Screened| inquiry.candidates[one.number].about.name;
     let gained = |one: &Screened| {
         let Candidate { about, form, .. } = &inquiry.candidates[one.number];
@@ -166,6 +177,7 @@ fn likely<'s, T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, scree
     };
     keep(&gained, BY_GAIN);
     keep(&|one| one.score, BY_SCREEN);
+    keep(&|one| if kin(one) { 1.0 + one.score } else { 0.0 }, screened.len());
     kept
 }
 

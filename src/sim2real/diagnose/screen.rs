@@ -50,12 +50,35 @@ pub(super) fn signatures<T: Twin>(
         grounds.push(Ground::new(inquiry, parent, &given));
     }
     let has: Vec<&str> = parent.added.iter().map(|n| inquiry.candidates[*n].about.name).collect();
-    (0..inquiry.candidates.len())
-        .into_par_iter()
+    let (wider, plain): (Vec<usize>, Vec<usize>) = (0..inquiry.candidates.len())
         .filter(|number| !inquiry.candidates[*number].finishing && wanted(&inquiry.candidates[*number]))
         .filter(|number| !has.contains(&inquiry.candidates[*number].about.name))
-        .filter_map(|number| screen(inquiry, parent, number, &grounds))
-        .collect()
+        .partition(|number| inquiry.candidates[*number].general);
+    let mut screened: Vec<Screened> =
+        plain.into_par_iter().filter_map(|number| screen(inquiry, parent, number, &grounds)).collect();
+    let of_wider: Vec<Screened> =
+        wider.into_iter().filter_map(|number| widened(inquiry.candidates, number, &screened)).collect();
+    screened.extend(of_wider);
+    screened
+}
+
+/// A wider law, of which the form of its mechanism that screening likes best is one case: it begins as that does, and what it has beyond
+/// that as it may.
+fn widened(candidates: &[Candidate], number: usize, screened: &[Screened]) -> Option<Screened> {
+    let own = &candidates[number];
+    let alike = screened.iter().filter(|one| candidates[one.number].about.name == own.about.name);
+    let plain = alike.max_by(|a, b| a.score.total_cmp(&b.score))?;
+    let known = &candidates[plain.number].form.parameters;
+    let start = |plain: &Vec<f64>| -> Vec<f64> {
+        let (twins, of_plain) = plain.split_at(plain.len() - known.len());
+        let begun = own.form.parameters.iter().enumerate().map(|(k, parameter)| match known.get(k) {
+            Some(same) if same.unit == parameter.unit => of_plain[k].clamp(parameter.lower, parameter.upper),
+            _ if parameter.linear => parameter.nominal,
+            _ => parameter.starts.first().copied().unwrap_or(parameter.nominal),
+        });
+        twins.iter().copied().chain(begun).collect()
+    };
+    Some(Screened { number, starts: plain.starts.iter().map(start).collect(), ..plain.clone() })
 }
 
 /// What a signature is compared with: the parent's residual, and the directions its parameters can move it in.

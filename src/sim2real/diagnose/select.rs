@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use super::forms::reformed;
 use super::free_run::{steadiest_first, strays};
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::needed::{needed, needed_share};
 use super::screen::Screened;
-use super::weigh::{gain, lead, needed, needed_share, pursued, ranked, squares};
+use super::weigh::{gain, lead, pursued, ranked, squares};
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
 use crate::sim2real::identify::Effort;
@@ -38,6 +39,11 @@ const FAR_BEHIND: f64 = 0.5;
 const AS_MUCH: f64 = 1.5;
 /// Mechanisms of which all forms are fitted: those that stood best in the form that screening liked best.
 const IN_ALL_FORMS: usize = 3;
+/// So are those of mechanisms, and of so many at the most, whose signature promised to explain this part of the misfit and more, and
+/// whose fit came to less than this part of what was promised: screening likes a form for what it does at its starts.
+const PROMISED: f64 = 0.1;
+const KEPT: f64 = 0.5;
+const BROKEN_PROMISES: usize = 2;
 /// Signatures with a cosine above this look alike: such rivals are fitted too.
 const ALIKE: f64 = 0.9;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
@@ -282,7 +288,8 @@ fn once<T: Twin>(beam: &[Hypothesis<T>], jobs: &mut [(usize, Screened, bool)]) {
     }
 }
 
-/// The forms not fitted yet of those mechanisms that stand best beside the best parent; a wider law of the very best alone.
+/// The forms not fitted yet of those mechanisms that stand best beside the best parent, or fell short of what they promised; a wider law
+/// of the very best alone.
 fn further_forms<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     parent: &Hypothesis<T>,
@@ -298,11 +305,31 @@ fn further_forms<T: Twin>(
             best.push(added);
         }
     }
+    let broken = broken_promises(parent, jobs, brief);
     let further = |(place, one, fitted): &(usize, Screened, bool)| {
-        let known = if inquiry.candidates[one.number].general { &best[..best.len().min(1)] } else { &best };
-        *place == 0 && !fitted && one.excited && known.contains(&name(one.number))
+        let known = match inquiry.candidates[one.number].general {
+            true => best.first().is_some_and(|first| *first == name(one.number)),
+            false => best.contains(&name(one.number)) || broken.iter().any(|number| name(*number) == name(one.number)),
+        };
+        *place == 0 && !fitted && one.excited && known
     };
     jobs.iter().map(further).collect()
+}
+
+/// The candidates beside the best parent that explain far less than their signatures promised, those that promised most first.
+fn broken_promises<T: Twin>(
+    parent: &Hypothesis<T>,
+    jobs: &[(usize, Screened, bool)],
+    brief: &[Option<Hypothesis<T>>],
+) -> Vec<usize> {
+    let own = jobs.iter().zip(brief).filter(|((place, _, _), _)| *place == 0);
+    let broken = own.filter_map(|((_, one, _), child)| {
+        let (promised, kept) = (one.score.max(0.0).powi(2), 1.0 - squares(child.as_ref()?) / squares(parent));
+        (promised > PROMISED && kept < KEPT * promised).then_some((promised, one.number))
+    });
+    let mut broken: Vec<(f64, usize)> = broken.collect();
+    broken.sort_by(|a, b| b.0.total_cmp(&a.0));
+    broken.into_iter().take(BROKEN_PROMISES).map(|(_, number)| number).collect()
 }
 
 /// Fits to their end those of the briefly fitted hypotheses that may yet be the best.

@@ -9,28 +9,10 @@ use super::whiteness::ChannelMisfit;
 use crate::sim2real::identify::Effort;
 use crate::sim2real::{Clock, Parameter, Twin};
 
-/// A second mechanism must explain at least this part of the first misfit, and each one more this part, for laws never have
-/// quite the form of the real thing, and what they leave looks like something else; a second of messages must explain more, for of
-/// these it is not asked whether it carries over ...
-const SHARE: f64 = 0.002;
-const SHARE_OF_ORDERS: f64 = 0.01;
-const SHARE_OF_MORE: f64 = 0.03;
-/// ... unless it explains at least this part of all that was left: errors of form are not explained away so neatly.
-const COMPLETES: f64 = 0.8;
-/// What is of the size and colour of noise holds something besides, where so large a part of it is explained.
-const MORE_THAN_NOISE: f64 = 0.15;
-/// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
-const INFORMATIVE_ROWS: usize = 25;
-/// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were;
-/// or take away so much of what they are off by, all together, that no less than so many of them tell of it.
-const FEW_ROWS: usize = 4;
-const MOST: f64 = 0.8;
-const RESTORED: f64 = 0.2;
-const TAKEN_AWAY: f64 = 0.9;
-/// Residuals with an autocorrelation time below this [rows] are taken for white.
-const FAIRLY_WHITE: f64 = 2.0;
-/// What stands behind by more than this after a few steps is not followed further.
+/// What stands behind by more than this after a few steps is not followed further, ...
 const HOPELESS: f64 = 300.0;
+/// ... unless a few steps more leave it behind by no more than this part of that.
+const CATCHES_UP: f64 = 0.7;
 /// Mean squares of residuals, in units of the noise, that are no further apart than this say the same ...
 const TOLERATED: f64 = 0.03;
 /// ... where that is no more than this part of what they explain.
@@ -38,6 +20,8 @@ const NEXT_TO_NOTHING: f64 = 0.01;
 /// The evidence between two that say the same in as many constants is no more than this: of 45 names of five spent test seeds that were
 /// told apart by no more, 37 were right, and twice the logarithm of such odds is 3.
 const INDIFFERENT: f64 = 3.0;
+/// Laws that are met less often by themselves are held to be so many times less likely, as twice the logarithm: e to one.
+const SELDOM: f64 = 2.0;
 /// How a recording begins counts no more than this, twice the logarithm of twenty: laws of what is elastic or loose hold least in the
 /// first moments.
 const FIRST_MOMENTS: f64 = 6.0;
@@ -102,7 +86,7 @@ fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypot
 /// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other: what the
 /// recordings say, and what the twin says of its own parameters.
 pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
-    let by_own = plausibility(inquiry, &a.fit.values) - plausibility(inquiry, &b.fit.values);
+    let by_own = beforehand(inquiry, a) - beforehand(inquiry, b);
     let evidence = evidence(inquiry, first, a, b);
     if !alike(inquiry, first, a, b) {
         return evidence + by_own;
@@ -118,6 +102,12 @@ pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: 
         longer => longer * (1.0 + least_left(a, b).misfits.iter().map(ChannelMisfit::effective).sum::<f64>()).ln(),
     };
     said + by_own + (rested(a) - rested(b)).clamp(-FIRST_MOMENTS, FIRST_MOMENTS)
+}
+
+/// Twice the logarithm of how likely `hypothesis` is before anything is recorded, but for what all have in common.
+fn beforehand<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> f64 {
+    let seldom = hypothesis.added.iter().filter(|number| inquiry.candidates[**number].seldom).count();
+    plausibility(inquiry, &hypothesis.fit.values) - SELDOM * seldom as f64
 }
 
 /// How many of the laws of `hypothesis` are others at other times.
@@ -169,117 +159,9 @@ pub(super) fn plausibility<T: Twin>(inquiry: &Inquiry<'_, T>, values: &[f64]) ->
     distances.map(|z| -(FREEDOM + 1.0) * (z * z / FREEDOM).ln_1p()).sum()
 }
 
-/// The least part of the parent's residual that a further mechanism has to explain to be needed.
-pub(super) fn needed_share<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, parent: &Hypothesis<T>) -> f64 {
-    if parent.added.is_empty() {
-        return 0.0;
-    }
-    let least = |(first, left): (&ChannelMisfit, &ChannelMisfit)| {
-        let most = (share_of(inquiry.twin.clock(), parent.added.len() + 1) * above_noise(first, left.level))
-            .min(COMPLETES * above_noise(left, left.level));
-        most / left.sum_of_squares.max(1e-300)
-    };
-    first.misfits.iter().zip(&parent.misfits).map(least).fold(f64::INFINITY, f64::min)
-}
-
-/// The part of the first misfit that the last of so many mechanisms must explain.
-fn share_of(clock: Clock, mechanisms: usize) -> f64 {
-    match clock {
-        _ if mechanisms > 2 => SHARE_OF_MORE,
-        Clock::Event => SHARE_OF_ORDERS,
-        Clock::Sampled { .. } => SHARE,
-    }
-}
-
-/// Whether `better` explains nearly all that `other` leaves above noise as white as what `better` leaves.
-pub(super) fn completes<T>(other: &Hypothesis<T>, better: &Hypothesis<T>) -> bool {
-    other.misfits.iter().zip(&better.misfits).any(|(other, better)| {
-        let mean_square = better.sum_of_squares / better.count.max(1) as f64;
-        let white = better.autocorrelation_time < FAIRLY_WHITE || better.level > 1.0;
-        let level = if white { mean_square } else { 1.0 };
-        let explained = other.sum_of_squares - better.sum_of_squares;
-        explained > 0.0 && explained >= COMPLETES * other.above(level)
-    })
-}
-
-/// What a misfit has above noise of that level.
-fn above_noise(misfit: &ChannelMisfit, level: f64) -> f64 {
-    misfit.above(level).max(0.1 * misfit.sum_of_squares)
-}
-
 /// Sum of squared residuals of all channels.
 pub(super) fn squares<T>(hypothesis: &Hypothesis<T>) -> f64 {
     hypothesis.misfits.iter().map(|m| m.sum_of_squares).sum()
-}
-
-/// By what part of the first misfit above the noise `better` explains more than `other`, in the channel where it is most.
-pub(super) fn share<T>(first: &Hypothesis<T>, other: &Hypothesis<T>, better: &Hypothesis<T>) -> f64 {
-    let channels = first.misfits.iter().zip(&other.misfits).zip(&better.misfits);
-    channels
-        .map(|((first, other), better)| {
-            (other.sum_of_squares - better.sum_of_squares) / above_noise(first, better.level).max(1e-300)
-        })
-        .fold(f64::NEG_INFINITY, f64::max)
-}
-
-/// Whether `whole` explains enough more than `less`, in enough rows.
-pub(super) fn needed<T: Twin>(
-    inquiry: &Inquiry<'_, T>,
-    first: &Hypothesis<T>,
-    less: &Hypothesis<T>,
-    whole: &Hypothesis<T>,
-) -> bool {
-    let enough = whole.added.len() == 1
-        || first
-            .misfits
-            .iter()
-            .zip(&less.misfits)
-            .zip(&whole.misfits)
-            .any(|((first, less), last)| explains_enough(inquiry.twin.clock(), whole.added.len(), [first, less, last]));
-    let rows = inquiry.problem(&whole.twin, &inquiry.evidence.compared).blocks().last().map_or(0, |b| b.range.end);
-    let change = || (0..rows).map(|i| less.fit.residual[i] - whole.fit.residual[i]);
-    let moved = change().filter(|d| d.abs() > 1.0).count();
-    // Effects below the noise show in the sum of many rows only: over how many it is spread counts then.
-    let (fourth, second) = change().fold((0.0, 0.0), |(f, s), d| (f + d.powi(4), s + d.powi(2)));
-    // Messages tell some things exactly: a few that nothing else accounts for are enough.
-    let restored = (0..rows).filter(|i| {
-        let (before, after) = (less.fit.residual[*i], whole.fit.residual[*i]);
-        (before - after).abs() > 1.0 && after.abs() < RESTORED * before.abs()
-    });
-    let restored = restored.count();
-    let few = restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64;
-    let pairs: Vec<[f64; 2]> = (0..rows).map(|i| [less.fit.residual[i], whole.fit.residual[i]]).collect();
-    let seen = inquiry.twin.clock() == Clock::Event && (few || takes_away(&pairs) || most_of_few(moved, rows));
-    let spread = rows > 40 * INFORMATIVE_ROWS && second * second >= INFORMATIVE_ROWS as f64 * fourth;
-    enough && (spread || seen || moved >= INFORMATIVE_ROWS)
-}
-
-/// Whether so many are most of all the messages there are, where these are no more than a few times as many as would tell of anything.
-fn most_of_few(moved: usize, messages: usize) -> bool {
-    messages <= INFORMATIVE_ROWS && moved >= 2 * FEW_ROWS && moved as f64 >= MOST * messages as f64
-}
-
-/// Whether the last of so many mechanisms explains enough of a channel that leaves so much with none, without it and with it. A channel in
-/// which nothing is off speaks for none.
-fn explains_enough(clock: Clock, mechanisms: usize, [first, less, last]: [&ChannelMisfit; 3]) -> bool {
-    let explained = less.sum_of_squares - last.sum_of_squares;
-    let (all, left) = (above_noise(first, last.level), above_noise(less, last.level));
-    let noise_alone = less.like_noise() && explained < MORE_THAN_NOISE * less.sum_of_squares;
-    let completes = !noise_alone && explained >= COMPLETES * left;
-    explained > 0.0 && (explained >= share_of(clock, mechanisms) * all || completes)
-}
-
-/// Whether of the messages that are moved, each off by so much before and after, nearly all that they were off by is gone, and more than a
-/// few tell of it: a limit that varies from order to order restores none of them exactly.
-fn takes_away(messages: &[[f64; 2]]) -> bool {
-    let moved = messages.iter().filter(|[before, after]| (before - after).abs() > 1.0);
-    let [mut before, mut after, mut fourth] = [0.0; 3];
-    for [was, is] in moved {
-        before += was * was;
-        after += is * is;
-        fourth += was.powi(4);
-    }
-    before > 0.0 && after <= (1.0 - TAKEN_AWAY) * before && before * before >= FEW_ROWS as f64 * fourth
 }
 
 /// `sum N_e ln(RSS0 / RSS1) - dk ln N_e`, with the effective number of residuals of the *alternative*: autocorrelated
@@ -305,7 +187,8 @@ fn weighed<T: Twin>(
     gain - (alternative.free() as f64 - null.free() as f64) * effective.ln()
 }
 
-/// `less`, which is a part of `best`, with another candidate: fitted to its end if it comes near `best` in a few steps.
+/// `less`, which is a part of `best`, with another candidate: fitted to its end if it comes near `best` in a few steps, or in a few more
+/// for as long as it catches up.
 pub(super) fn pursued<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     first: &Hypothesis<T>,
@@ -313,8 +196,18 @@ pub(super) fn pursued<T: Twin>(
     less: &Hypothesis<T>,
     one: &Screened,
 ) -> Hypothesis<T> {
-    let briefly = inquiry.instead(best, less, one, Effort::Brief);
-    if lead(inquiry, first, best, &briefly) < HOPELESS { inquiry.refitted(&briefly) } else { briefly }
+    let mut briefly = inquiry.instead(best, less, one, Effort::Brief);
+    let mut behind = lead(inquiry, first, best, &briefly);
+    while behind >= HOPELESS {
+        let further = inquiry.followed_on(&briefly, Effort::Brief);
+        let now = lead(inquiry, first, best, &further);
+        // What ran away is behind by no number.
+        if now.is_nan() || now > CATCHES_UP * behind {
+            return briefly;
+        }
+        (briefly, behind) = (further, now);
+    }
+    inquiry.refitted(&briefly)
 }
 
 #[cfg(test)]
@@ -362,43 +255,6 @@ pub(super) mod tests {
         assert!(std::ptr::eq(scale_of(&leaving(1.2, 4_500.0), &white), &raw const white));
         let less_white = leaving(1.2, 3_500.0);
         assert!(std::ptr::eq(scale_of(&less_white, &white), &raw const less_white), "of many the number is known well");
-    }
-
-    #[test]
-    fn a_second_of_messages_must_explain_more_than_one_of_samples_and_a_third_most() {
-        let sampled = Clock::Sampled { longest_step: 0.01 };
-        assert!(share_of(Clock::Event, 2) > 2.0 * share_of(sampled, 2), "it is not asked whether it carries over");
-        assert!(share_of(sampled, 3) > share_of(Clock::Event, 2));
-        assert!((share_of(Clock::Event, 3) - share_of(sampled, 3)).abs() < f64::EPSILON);
-    }
-
-    /// Of 671 orders an impact explains nearly all of what they cost, and another one a thousandth; of the part filled nothing is off.
-    #[test]
-    fn a_channel_in_which_nothing_is_off_speaks_for_no_second_mechanism() {
-        let misfit = |mean_square: f64| {
-            let h = leaving(mean_square, 5_900.0);
-            h.misfits.into_iter().next().unwrap()
-        };
-        let enough = |squares: [f64; 3]| {
-            let [first, less, last] = squares.map(misfit);
-            explains_enough(Clock::Event, 2, [&first, &less, &last])
-        };
-        assert!(!enough([38.0, 1.04, 0.99]), "a thousandth of all, and half of what is left");
-        assert!(enough([38.0, 1.5, 0.99]) && enough([3.0, 1.04, 0.99]));
-        assert!(!enough([0.0, 0.0, 0.0]));
-    }
-
-    #[test]
-    fn few_messages_tell_of_a_limit_that_varies_and_one_large_one_does_not() {
-        let cut =
-            |varies: f64| -> Vec<[f64; 2]> { (0..12).map(|k| [-30.0 - k as f64, varies * (k as f64 - 5.5)]).collect() };
-        assert!(takes_away(&cut(1.5)), "none is restored to a fifth, all together are to a tenth");
-        assert!(!takes_away(&cut(3.5)), "too much is left");
-        let mut one = cut(1.0);
-        one.push([-900.0, 2.0]);
-        assert!(!takes_away(&one), "one of them is nearly all there is");
-        assert!(most_of_few(9, 10) && !most_of_few(7, 7) && !most_of_few(9, 12) && !most_of_few(30, 30));
-        assert!(!takes_away(&[[-30.0, 0.0]; 3]) && takes_away(&[[-30.0, 0.0]; 4]) && !takes_away(&[]));
     }
 
     #[test]

@@ -128,7 +128,12 @@ pub fn fit_from<S: Simulator>(
         .par_iter()
         .map(|start| {
             let mut descent = Descent::new(problem, start, free, state);
-            descent.run(if starts.len() > 1 { PROBE } else { steps });
+            if starts.len() > 1 {
+                descent.run(PROBE);
+                descent.run_while_falling(PROBE, STEEP);
+            } else {
+                descent.run(steps);
+            }
             descent
         })
         .collect();
@@ -141,7 +146,7 @@ pub fn fit_from<S: Simulator>(
         descents.par_iter_mut().for_each(|d| d.run(steps));
     }
     if effort == Effort::Brief {
-        descents.par_iter_mut().for_each(|d| d.run_while_falling(Effort::Thorough.steps()));
+        descents.par_iter_mut().for_each(|d| d.run_while_falling(Effort::Thorough.steps(), FALLING));
     }
     match descents.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective)) {
         Some(best) => best.fit(),
@@ -149,8 +154,9 @@ pub fn fit_from<S: Simulator>(
     }
 }
 
-/// Steps that tell which starts lead somewhere.
+/// Steps that tell which starts lead somewhere; one that takes away this part of what is left with each is given as many again.
 const PROBE: usize = 3;
+const STEEP: f64 = 0.25;
 /// A start that stands at most this much higher than the best is followed too.
 const NEAR: f64 = 1.05;
 
@@ -220,10 +226,10 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         }
     }
 
-    /// Makes at most `steps` more steps, and ends with the first that does not take away [`FALLING`] of what is left.
-    fn run_while_falling(&mut self, steps: usize) {
+    /// Makes at most `steps` more steps, and ends with the first that does not take away this part of what is left.
+    fn run_while_falling(&mut self, steps: usize, least: f64) {
         for _ in 0..steps {
-            if self.ended || self.fell < FALLING {
+            if self.ended || self.fell < least {
                 return;
             }
             self.step();
