@@ -6,35 +6,40 @@
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::{ACCEPT, Selection};
-use super::weigh::lead;
+use super::weigh::{lead, squares};
 use crate::sim2real::Twin;
 
-/// Whether one of the laws that were selected would go on beyond what goes by its name.
+/// Whether the law that explains most of all that were selected would go on beyond what goes by its name.
 pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> bool {
     let selected = &selection.selected;
-    opened(inquiry, selected).is_some_and(|twin| {
+    let left: Vec<f64> = selection.without.iter().map(squares).collect();
+    let Some(place) = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b])) else { return false };
+    opened(inquiry, selected, place).is_some_and(|twin| {
         let further = inquiry.followed_as(twin, selected);
         lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT
     })
 }
 
-/// The twin of `selected`, whose laws may go on where they ended at the edge of what goes by their names; none where none did.
-fn opened<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<T> {
+/// The twin of `selected`, whose `place`-th law may go on where it ended at the edge of what goes by its name; none where it did not.
+fn opened<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, place: usize) -> Option<T> {
     let mut twin = inquiry.twin.clone();
     let mut open = false;
-    for number in &selected.added {
+    for (k, number) in selected.added.iter().enumerate() {
         let mut candidate = inquiry.candidates[*number].clone();
-        let first = twin.parameters().len();
-        let parameters = candidate.form.parameters.iter_mut().zip(&candidate.bounds).enumerate();
-        for (k, (parameter, [lower, upper])) in parameters.filter(|(k, _)| selected.fit.at_bound.contains(&(first + k))) {
-            let value = selected.fit.values[first + k];
-            let (before, below) = ([parameter.lower, parameter.upper], value <= parameter.lower);
-            if below {
-                parameter.lower = *lower
-            } else {
-                parameter.upper = *upper
+        if k == place {
+            let first = twin.parameters().len();
+            let parameters = candidate.form.parameters.iter_mut().zip(&candidate.bounds).enumerate();
+            for (k, (parameter, [lower, upper])) in parameters.filter(|(k, _)| selected.fit.at_bound.contains(&(first + k)))
+            {
+                let before = [parameter.lower, parameter.upper];
+                let below = selected.fit.values[first + k] <= parameter.lower;
+                if below {
+                    parameter.lower = *lower
+                } else {
+                    parameter.upper = *upper
+                }
+                open |= before != [parameter.lower, parameter.upper];
             }
-            open |= before != [parameter.lower, parameter.upper];
         }
         twin = twin.with(&candidate);
     }

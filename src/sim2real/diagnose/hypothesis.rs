@@ -1,5 +1,7 @@
 //! A hypothesis: the twin with some mechanisms added, fitted as well as it goes.
 
+use std::ops::Range;
+
 use super::evidence::Evidence;
 use super::screen::{Screened, signatures};
 use super::whiteness::{ChannelMisfit, channel_misfits};
@@ -113,10 +115,8 @@ impl<T: Twin> Inquiry<'_, T> {
             others.eq(less.added.iter().copied())
         })?;
         let count = |number: &usize| self.candidates[*number].form.parameters.len();
-        let from = self.twin.parameters().len() + whole.added[..place].iter().map(count).sum::<usize>();
-        let own = from..from + count(&whole.added[place]);
-        let mut values = whole.fit.values[..own.start].to_vec();
-        values.extend_from_slice(&whole.fit.values[own.end..]);
+        let own = self.parameters_of(whole, place);
+        let mut values = self.kept(whole, place);
         values.extend_from_slice(screened.starts.first()?.get(values.len()..)?);
         let shared = values.len() - count(&screened.number);
         let (before, after) = (&self.candidates[whole.added[place]], &self.candidates[screened.number]);
@@ -127,6 +127,19 @@ impl<T: Twin> Inquiry<'_, T> {
             }
         }
         Some(values)
+    }
+
+    /// Values of all parameters of `whole` but those of its `place`-th mechanism.
+    pub fn kept(&self, whole: &Hypothesis<T>, place: usize) -> Vec<f64> {
+        let own = self.parameters_of(whole, place);
+        [&whole.fit.values[..own.start], &whole.fit.values[own.end..]].concat()
+    }
+
+    /// Numbers of the parameters of the `place`-th mechanism of `whole`.
+    fn parameters_of(&self, whole: &Hypothesis<T>, place: usize) -> Range<usize> {
+        let count = |number: &usize| self.candidates[*number].form.parameters.len();
+        let from = self.twin.parameters().len() + whole.added[..place].iter().map(count).sum::<usize>();
+        from..from + count(&whole.added[place])
     }
 
     /// `whole` without the `position`-th of its mechanisms, refitted from the joint solution and from the twin as given.

@@ -6,7 +6,7 @@ use super::carry_over::carries_over;
 use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::needed::{completes, share};
-use super::screen::Screened;
+use super::screen::{Ground, Screened};
 use super::select::Selection;
 use super::weigh::{evidence, gain, lead, left_open, pursued};
 use crate::sim2real::{About, Candidate, Clock, Twin};
@@ -122,13 +122,17 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
         .added
         .iter()
         .zip(&selection.without)
-        .map(|(own, less)| {
+        .enumerate()
+        .map(|(place, (own, less))| {
             let name = inquiry.candidates[*own].about.name;
             let whole = gain(inquiry, less, selected);
             let mut screened = inquiry.screened(less);
             screened.retain(|one| one.excited && inquiry.candidates[one.number].about.name != name);
+            // Beside what was refitted without it a rival may look like nothing: it is begun with all else as it stands beside it, too.
+            let ground = Ground::new(inquiry, less, &inquiry.kept(selected, place));
             let losses = |tried: Vec<&Screened>| -> Vec<(usize, f64)> {
                 let one = |s: &&Screened| {
+                    let s = &ground.begin(inquiry, less, s);
                     let rival = pursued(inquiry, &selection.recalibrated, selected, less, s);
                     let abouts = (inquiry.candidates[*own].about, inquiry.candidates[s.number].about);
                     let loss = loss(inquiry, &selection.recalibrated, selected, &rival, abouts);
