@@ -110,13 +110,10 @@ impl<T: Twin> Inquiry<'_, T> {
     /// Where `whole` stands, with another of its mechanisms at its most promising start instead of the one that `less` lacks, and
     /// with what both call alike as it was.
     fn in_place(&self, whole: &Hypothesis<T>, less: &Hypothesis<T>, screened: &Screened) -> Option<Vec<f64>> {
-        let place = (0..whole.added.len()).find(|i| {
-            let others = whole.added.iter().enumerate().filter(|(k, _)| k != i).map(|(_, number)| *number);
-            others.eq(less.added.iter().copied())
-        })?;
+        let place = self.replaced(whole, less)?;
         let count = |number: &usize| self.candidates[*number].form.parameters.len();
         let own = self.parameters_of(whole, place);
-        let mut values = self.kept(whole, place);
+        let mut values = self.kept(whole, less)?;
         values.extend_from_slice(screened.starts.first()?.get(values.len()..)?);
         let shared = values.len() - count(&screened.number);
         let (before, after) = (&self.candidates[whole.added[place]], &self.candidates[screened.number]);
@@ -129,10 +126,18 @@ impl<T: Twin> Inquiry<'_, T> {
         Some(values)
     }
 
-    /// Values of all parameters of `whole` but those of its `place`-th mechanism.
-    pub fn kept(&self, whole: &Hypothesis<T>, place: usize) -> Vec<f64> {
-        let own = self.parameters_of(whole, place);
-        [&whole.fit.values[..own.start], &whole.fit.values[own.end..]].concat()
+    /// The place of the mechanism that `whole` has beyond `less`, where all others are the same, in the same forms.
+    fn replaced(&self, whole: &Hypothesis<T>, less: &Hypothesis<T>) -> Option<usize> {
+        (0..whole.added.len()).find(|i| {
+            let others = whole.added.iter().enumerate().filter(|(k, _)| k != i).map(|(_, number)| *number);
+            others.eq(less.added.iter().copied())
+        })
+    }
+
+    /// Values of the parameters of `less`, as they are in `whole`, which has one mechanism more; none where others differ too.
+    pub fn kept(&self, whole: &Hypothesis<T>, less: &Hypothesis<T>) -> Option<Vec<f64>> {
+        let own = self.parameters_of(whole, self.replaced(whole, less)?);
+        Some([&whole.fit.values[..own.start], &whole.fit.values[own.end..]].concat())
     }
 
     /// Numbers of the parameters of the `place`-th mechanism of `whole`.

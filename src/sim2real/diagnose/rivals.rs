@@ -122,18 +122,18 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
         .added
         .iter()
         .zip(&selection.without)
-        .enumerate()
-        .map(|(place, (own, less))| {
+        .map(|(own, less)| {
             let name = inquiry.candidates[*own].about.name;
             let whole = gain(inquiry, less, selected);
             let mut screened = inquiry.screened(less);
             screened.retain(|one| one.excited && inquiry.candidates[one.number].about.name != name);
             // Beside what was refitted without it a rival may look like nothing: it is begun with all else as it stands beside it, too.
-            let ground = Ground::new(inquiry, less, &inquiry.kept(selected, place));
+            let ground = inquiry.kept(selected, less).map(|values| Ground::new(inquiry, less, &values));
             let losses = |tried: Vec<&Screened>| -> Vec<(usize, f64)> {
                 let one = |s: &&Screened| {
-                    let s = &ground.begin(inquiry, less, s);
-                    let rival = pursued(inquiry, &selection.recalibrated, selected, less, s);
+                    let begun = ground.as_ref().map(|ground| ground.begin(inquiry, less, s));
+                    let begun = begun.as_ref().unwrap_or(s);
+                    let rival = pursued(inquiry, &selection.recalibrated, selected, less, begun);
                     let abouts = (inquiry.candidates[*own].about, inquiry.candidates[s.number].about);
                     let loss = loss(inquiry, &selection.recalibrated, selected, &rival, abouts);
                     // What runs away cannot be compared: it is no rival.

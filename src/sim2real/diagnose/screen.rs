@@ -367,3 +367,38 @@ fn scaled(candidate: &Candidate, tried: &Tried, ground: &Ground) -> Option<Vec<f
     let sensible = value.is_finite() && (0.01..100.0).contains(&factor) && (factor - 1.0).abs() > 0.2;
     (sensible && p.smooth && !p.linear).then(|| vec![value.clamp(p.lower, p.upper)])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim2real::{About, Form, Parameter, Site};
+
+    fn candidate(general: bool, parameters: Vec<Parameter>) -> Candidate {
+        let about = About { name: "teeth", site: Site::Plant, title: "", law: "", source: "", remedy: "", contains: &[] };
+        let bounds = parameters.iter().map(|p| [p.lower, p.upper]).collect();
+        let form = Form { name: if general { "wide" } else { "plain" }, parameters };
+        let form_index = usize::from(general);
+        Candidate { about, form, form_index, finishing: false, general, ages: false, seldom: false, bounds }
+    }
+
+    #[test]
+    fn a_wider_law_begins_where_the_plainer_one_would() {
+        let parameter = |name, unit| Parameter::new(name, unit, 0.0).within(0.0, 10.0).starting_at(&[3.0]);
+        let shared = vec![parameter("depth", "N m"), parameter("number", "")];
+        let wide = vec![
+            parameter("deepest", "N m"),
+            parameter("per_length", "1/m"),
+            parameter("angle", "rad"),
+            parameter("second", "N m").proportional(),
+        ];
+        let candidates = [candidate(false, shared), candidate(true, wide)];
+        let signature = DVector::from_element(2, 0.5);
+        // One value of the twin's own; then those of the plainer law, of which one lies beyond what the wider may be.
+        let starts = vec![vec![0.7, 12.0, 5.0]];
+        let plain = Screened { number: 0, score: 0.4, survival: 0.9, excited: true, starts, signature };
+        let found = widened(&candidates, 1, std::slice::from_ref(&plain)).unwrap();
+        assert_eq!(found.starts, [vec![0.7, 10.0, 3.0, 3.0, 0.0]], "same units go on; others start, or do nothing yet");
+        assert_eq!((found.number, found.score, found.excited), (1, 0.4, true));
+        assert!(widened(&candidates, 1, &[]).is_none());
+    }
+}

@@ -40,7 +40,7 @@ const WORSE: f64 = 1.02;
 const HARDLY_THE_LIBRARY: f64 = 0.1;
 /// The same of a single name, and of what does not carry over to held-out data either.
 const LIKELIER_THAN_NOT: f64 = 0.5;
-/// What takes part of something unknown is right so many times less often than its evidence has it (development seeds 51, 61 and 62).
+/// What takes part of something unknown in signals is right so many times less often than its evidence has it (development seeds 51, 61 and 62).
 const PART_OF_IT: f64 = 0.35;
 /// A name less certain than this is ambiguous.
 const CERTAIN: f64 = 0.7;
@@ -90,7 +90,8 @@ pub(super) fn diagnosis<T: Twin>(
         verdict => verdict,
     };
     if verdict == Verdict::Unexplained {
-        let after_all = PART_OF_IT * (1.0 - findings.remainder.clamp(0.0, 1.0));
+        let part_of_it = if findings.sampled { PART_OF_IT } else { 1.0 };
+        let after_all = part_of_it * (1.0 - findings.remainder.clamp(0.0, 1.0));
         effects.iter_mut().for_each(|e| e.confidence *= after_all);
     }
     let blocks = inquiry.problem(&selected.twin, &inquiry.evidence.compared).blocks();
