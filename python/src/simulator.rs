@@ -264,7 +264,16 @@ impl ScriptedSimulator {
     ) -> PyResult<Self> {
         let candidate = |(id, parameters): (String, Vec<ParameterRow>)| {
             let form = Form { name: "", parameters: parameters.into_iter().map(parameter).collect() };
-            Ok(Candidate { about: about(py, &id)?, form, form_index: 0, finishing: false, general: false, ages: false })
+            Ok(Candidate {
+                about: about(py, &id)?,
+                bounds: form.parameters.iter().map(|parameter| [parameter.lower, parameter.upper]).collect(),
+                form,
+                form_index: 0,
+                finishing: false,
+                general: false,
+                ages: false,
+                seldom: false,
+            })
         };
         let parameters: Vec<Parameter> = parameters.into_iter().map(parameter).collect();
         let initial = initial.into_iter().map(|(name, unit, value, channel, derivative, std)| Initial {
