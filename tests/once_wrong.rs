@@ -203,11 +203,3 @@ fn a_law_that_would_go_on_beyond_its_name_is_something_unknown() {
 fn kin_are_rivals_whatever_screening_says() {
     assert_eq!(names(&tried(61, 107)), ["hysteresis"]);
 }
-
-/// Springs beside play, straight or hardening, differ by a gravity torque that is off: neither is found from where the other is missing.
-#[test]
-fn a_rival_begins_with_all_else_as_it_stands() {
-    let trial = tried(61, 133);
-    let spring = trial.found.iter().find(|found| found.mechanism.ends_with("stiffness")).unwrap();
-    assert!(spring.rivals.iter().any(|rival| rival.ends_with("stiffness")), "{spring:?}");
-}

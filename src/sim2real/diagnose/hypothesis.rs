@@ -1,7 +1,5 @@
 //! A hypothesis: the twin with some mechanisms added, fitted as well as it goes.
 
-use std::ops::Range;
-
 use super::evidence::Evidence;
 use super::screen::{Screened, signatures};
 use super::whiteness::{ChannelMisfit, channel_misfits};
@@ -110,10 +108,15 @@ impl<T: Twin> Inquiry<'_, T> {
     /// Where `whole` stands, with another of its mechanisms at its most promising start instead of the one that `less` lacks, and
     /// with what both call alike as it was.
     fn in_place(&self, whole: &Hypothesis<T>, less: &Hypothesis<T>, screened: &Screened) -> Option<Vec<f64>> {
-        let place = self.replaced(whole, less)?;
+        let place = (0..whole.added.len()).find(|i| {
+            let others = whole.added.iter().enumerate().filter(|(k, _)| k != i).map(|(_, number)| *number);
+            others.eq(less.added.iter().copied())
+        })?;
         let count = |number: &usize| self.candidates[*number].form.parameters.len();
-        let own = self.parameters_of(whole, place);
-        let mut values = self.kept(whole, less)?;
+        let from = self.twin.parameters().len() + whole.added[..place].iter().map(count).sum::<usize>();
+        let own = from..from + count(&whole.added[place]);
+        let mut values = whole.fit.values[..own.start].to_vec();
+        values.extend_from_slice(&whole.fit.values[own.end..]);
         values.extend_from_slice(screened.starts.first()?.get(values.len()..)?);
         let shared = values.len() - count(&screened.number);
         let (before, after) = (&self.candidates[whole.added[place]], &self.candidates[screened.number]);
@@ -124,27 +127,6 @@ impl<T: Twin> Inquiry<'_, T> {
             }
         }
         Some(values)
-    }
-
-    /// The place of the mechanism that `whole` has beyond `less`, where all others are the same, in the same forms.
-    fn replaced(&self, whole: &Hypothesis<T>, less: &Hypothesis<T>) -> Option<usize> {
-        (0..whole.added.len()).find(|i| {
-            let others = whole.added.iter().enumerate().filter(|(k, _)| k != i).map(|(_, number)| *number);
-            others.eq(less.added.iter().copied())
-        })
-    }
-
-    /// Values of the parameters of `less`, as they are in `whole`, which has one mechanism more; none where others differ too.
-    pub fn kept(&self, whole: &Hypothesis<T>, less: &Hypothesis<T>) -> Option<Vec<f64>> {
-        let own = self.parameters_of(whole, self.replaced(whole, less)?);
-        Some([&whole.fit.values[..own.start], &whole.fit.values[own.end..]].concat())
-    }
-
-    /// Numbers of the parameters of the `place`-th mechanism of `whole`.
-    fn parameters_of(&self, whole: &Hypothesis<T>, place: usize) -> Range<usize> {
-        let count = |number: &usize| self.candidates[*number].form.parameters.len();
-        let from = self.twin.parameters().len() + whole.added[..place].iter().map(count).sum::<usize>();
-        from..from + count(&whole.added[place])
     }
 
     /// `whole` without the `position`-th of its mechanisms, refitted from the joint solution and from the twin as given.

@@ -6,7 +6,7 @@ use super::carry_over::carries_over;
 use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::needed::{completes, share};
-use super::screen::{Ground, Screened};
+use super::screen::Screened;
 use super::select::Selection;
 use super::weigh::{evidence, gain, lead, left_open, pursued};
 use crate::sim2real::{About, Candidate, Clock, Twin};
@@ -127,13 +127,9 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
             let whole = gain(inquiry, less, selected);
             let mut screened = inquiry.screened(less);
             screened.retain(|one| one.excited && inquiry.candidates[one.number].about.name != name);
-            // Beside what was refitted without it a rival may look like nothing: it is begun with all else as it stands beside it, too.
-            let ground = inquiry.kept(selected, less).map(|values| Ground::new(inquiry, less, &values));
             let losses = |tried: Vec<&Screened>| -> Vec<(usize, f64)> {
                 let one = |s: &&Screened| {
-                    let begun = ground.as_ref().map(|ground| ground.begin(inquiry, less, s));
-                    let begun = begun.as_ref().unwrap_or(s);
-                    let rival = pursued(inquiry, &selection.recalibrated, selected, less, begun);
+                    let rival = pursued(inquiry, &selection.recalibrated, selected, less, s);
                     let abouts = (inquiry.candidates[*own].about, inquiry.candidates[s.number].about);
                     let loss = loss(inquiry, &selection.recalibrated, selected, &rival, abouts);
                     // What runs away cannot be compared: it is no rival.

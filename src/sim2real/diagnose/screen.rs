@@ -82,7 +82,7 @@ fn widened(candidates: &[Candidate], number: usize, screened: &[Screened]) -> Op
 }
 
 /// What a signature is compared with: the parent's residual, and the directions its parameters can move it in.
-pub(super) struct Ground {
+struct Ground {
     /// Values of the parent's parameters.
     values: Vec<f64>,
     /// What initial states explain, part by part.
@@ -98,7 +98,7 @@ pub(super) struct Ground {
 impl Ground {
     /// Beside `parent` at these values of its parameters. Channels are brought to the same size first, so that a large misfit in one does
     /// not drown another.
-    pub fn new<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, values: &[f64]) -> Self {
+    fn new<T: Twin>(inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, values: &[f64]) -> Self {
         let problem = inquiry.problem(&parent.twin, &inquiry.evidence.compared);
         let blocks = problem.blocks();
         let state = parent.fit.state.clone();
@@ -115,13 +115,6 @@ impl Ground {
         let mut residual = followed.component_mul(&scale);
         without(&mut [residual.as_mut_slice()], &hidden);
         Self { values: values.to_vec(), basis, state, followed, scale, hidden, residual }
-    }
-
-    /// `one`, which was screened beside `parent`, begun where it promises most from here.
-    pub fn begin<T: Twin>(&self, inquiry: &Inquiry<'_, T>, parent: &Hypothesis<T>, one: &Screened) -> Screened {
-        let here = screen(inquiry, parent, one.number, std::slice::from_ref(self)).filter(|here| here.score > 0.0);
-        let best = here.and_then(|here| here.starts.into_iter().next());
-        Screened { starts: best.into_iter().chain(one.starts.iter().cloned()).collect(), ..one.clone() }
     }
 
     /// The signatures of points at which these `residuals` are left, projected.
