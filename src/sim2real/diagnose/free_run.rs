@@ -60,12 +60,14 @@ pub(super) fn strays<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, wh
     }
 }
 
-/// Whether what was selected on windows does so much worse in free run than what was selected there, that it cannot be what is
-/// missing: it does not leave mere noise of windows, or what was selected in free run hardly leaves more than noise itself.
+/// Whether what was selected on windows does so much worse in free run than what was selected there, or so much as worse at greater
+/// length, that it cannot be what is missing: it does not leave mere noise of windows, or what was selected in free run hardly leaves
+/// more than noise itself.
 pub(super) fn worse_than<T: Twin>(windows: (&Inquiry<'_, T>, &Selection<T>), free_run: &Selection<T>) -> bool {
     let (inquiry, selection) = windows;
     let left = inquiry.left_in_free_run(&selection.selected);
-    let least = free_run.selected.fit.objective();
+    let longer = selection.selected.free() > free_run.selected.free();
+    let least = if longer { 1.0 } else { STRAYS } * free_run.selected.fit.objective();
     let in_doubt = !selection.complete() || free_run.selected.within(HARDLY_MORE);
-    in_doubt && !free_run.selected.added.is_empty() && left.is_some_and(|left| left > STRAYS * least)
+    in_doubt && !free_run.selected.added.is_empty() && left.is_some_and(|left| left > least)
 }
