@@ -204,3 +204,27 @@ fn a_law_that_would_go_on_beyond_its_name_is_something_unknown() {
 fn kin_are_rivals_whatever_screening_says() {
     assert_eq!(names(&tried(61, 107)), ["hysteresis"]);
 }
+
+/// A brake of two sigma, as dry friction in a form that has no edge to run to: in the form that has one it would have gone on.
+#[test]
+fn beyond_its_name_is_asked_of_every_form() {
+    assert_eq!(tried(61, 186).verdict, Verdict::Unexplained);
+}
+
+/// A spring that does not harden quite with the cube: what that leaves was named cogging.
+#[test]
+fn what_hardens_in_its_own_way_is_one_spring() {
+    let trial = tried(63, 21);
+    assert_eq!(names(&trial), ["cubic_stiffness"]);
+    assert_eq!(trial.verdict, Verdict::Named);
+}
+
+/// A bent shaft that went for coloured noise, though twice as much of it is left where nothing was fitted.
+#[test]
+fn noise_that_grows_is_no_noise() {
+    assert_eq!(tried(63, 86).verdict, Verdict::Unexplained);
+    // A saturation that was hardly reached where it was fitted, and a payload that changed elsewhere.
+    for index in [19, 55] {
+        assert_eq!(tried(63, index).verdict, Verdict::NotExcited, "case {index}");
+    }
+}

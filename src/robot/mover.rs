@@ -11,6 +11,14 @@ pub struct Motion {
     pub velocity: f64,
 }
 
+impl Motion {
+    /// Where the coordinate is in the middle of a step of `step` [s]: springs and whatever else depends on the place act from there.
+    #[must_use]
+    pub fn midway(&self, step: f64) -> f64 {
+        self.position + 0.5 * step * self.velocity
+    }
+}
+
 /// What mechanisms add to a coordinate that moves; the default adds nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Push {

@@ -94,7 +94,7 @@ impl<P: Mover> Law<P> for Teeth {
                 continue;
             }
             let motion = P::motion(state);
-            let (s, c) = (number * (motion.position + 0.5 * tick.step * motion.velocity)).sin_cos();
+            let (s, c) = (number * motion.midway(tick.step)).sin_cos();
             P::push(effect).effort += sine * s + cosine * c;
         }
     }
@@ -123,7 +123,7 @@ impl<P: Mover> Law<P> for Harmonics {
                 continue;
             }
             let motion = P::motion(state);
-            let (s, c) = (2.0 * number * (motion.position + 0.5 * tick.step * motion.velocity)).sin_cos();
+            let (s, c) = (2.0 * number * motion.midway(tick.step)).sin_cos();
             P::push(effect).effort += sine * s + cosine * c;
         }
     }

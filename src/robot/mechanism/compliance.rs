@@ -180,7 +180,7 @@ impl<P: Mover> Law<P> for OnMotor {
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let sides = |lane, state: &P::State, link: f64| {
             let motor = P::motion(state);
-            let midway = motor.position + 0.5 * tick.step * motor.velocity;
+            let midway = motor.midway(tick.step);
             Sides {
                 second: P::external(scene.dynamics, lane, state, link),
                 misplaced: P::external(scene.dynamics, lane, state, midway),

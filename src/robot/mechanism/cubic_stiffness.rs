@@ -3,9 +3,10 @@
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
-/// `-rate q^3`.
+/// `-rate q^3`; in the form `bent`, `-bent_rate q^3 - fifth_rate q^5`: none hardens quite with the cube.
 ///
-/// Source: Duffing, *Erzwungene Schwingungen bei veränderlicher Eigenfrequenz* (1918).
+/// Source: Duffing, *Erzwungene Schwingungen bei veränderlicher Eigenfrequenz* (1918); with a quintic term: Kovacic & Brennan (eds.),
+/// *The Duffing Equation* (2011).
 #[derive(Debug, Clone, Copy)]
 pub struct CubicStiffness;
 
@@ -15,8 +16,8 @@ impl<P: Mover> Mechanism<P> for CubicStiffness {
             name: "cubic_stiffness",
             site: Site::Plant,
             title: "a hardening spring",
-            law: "inertia a = ... - rate q^3",
-            source: "Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918)",
+            law: "inertia a = ... - rate q^3; bent: ... - bent_rate q^3 - fifth_rate q^5",
+            source: "Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918); Kovacic & Brennan (eds.), The Duffing Equation (2011)",
             remedy: "look for a bellows, bush or cable that tightens; add its rate to the simulator",
             contains: &[],
         }
@@ -24,9 +25,19 @@ impl<P: Mover> Mechanism<P> for CubicStiffness {
 
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = [0.05, 0.5].map(|fraction| fraction * typical.effort / typical.output.powi(3).max(1e-12));
-        Form::only(vec![
-            Parameter::new("rate", "N m/rad^3", 0.0).within(0.0, f64::INFINITY).starting_at(&starts).proportional(),
-        ])
+        let rate =
+            |name| Parameter::new(name, "N m/rad^3", 0.0).within(0.0, f64::INFINITY).starting_at(&starts).proportional();
+        let fifth = Parameter::new("fifth_rate", "N m/rad^5", 0.0)
+            .starting_at(&[0.02 * typical.effort / typical.output.powi(5).max(1e-12)])
+            .proportional();
+        vec![
+            Form { name: "cube", parameters: vec![rate("rate")] },
+            Form { name: "bent", parameters: vec![rate("bent_rate"), fifth] },
+        ]
+    }
+
+    fn general(&self, form: usize) -> bool {
+        form == 1
     }
 
     /// Springs that harden have a rate at rest too; and what is straight hardens a little.
@@ -34,8 +45,9 @@ impl<P: Mover> Mechanism<P> for CubicStiffness {
         true
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        Box::new(Spring(thetas.row(0).to_vec()))
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let rates = thetas.row(0).to_vec();
+        if form == 0 { Box::new(Spring(rates)) } else { Box::new(BentSpring { rates, fifths: thetas.row(1).to_vec() }) }
     }
 }
 
@@ -49,10 +61,29 @@ impl<P: Mover> Law<P> for Spring {
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         for ((effect, state), rate) in effects.iter_mut().zip(scene.states).zip(&self.0) {
-            let motion = P::motion(state);
-            // Springs act from where the coordinate is in the middle of the step.
-            let midway = motion.position + 0.5 * tick.step * motion.velocity;
-            P::push(effect).stiffness += rate * midway * midway;
+            let square = P::motion(state).midway(tick.step).powi(2);
+            P::push(effect).stiffness += rate * square;
+        }
+    }
+}
+
+#[derive(Clone)]
+struct BentSpring {
+    rates: Vec<f64>,
+    fifths: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for BentSpring {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.rates);
+        change.parameter(1, &mut self.fifths);
+    }
+
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let lanes = effects.iter_mut().zip(scene.states).zip(self.rates.iter().zip(&self.fifths));
+        for ((effect, state), (rate, fifth)) in lanes {
+            let square = P::motion(state).midway(tick.step).powi(2);
+            P::push(effect).stiffness += (rate + fifth * square) * square;
         }
     }
 }
@@ -78,5 +109,17 @@ mod tests {
         assert!((measured / period - 1.0).abs() < 1e-4, "{measured} s, expected {period} s");
         let highest = motion[10_000..].iter().map(|m| m.position).fold(0.0, f64::max);
         assert!((highest - amplitude).abs() < 1e-4, "{highest}");
+    }
+
+    /// Energy of the bent form: what is lifted against it comes back as speed.
+    #[test]
+    fn the_bent_form_keeps_the_energy_of_its_closed_form() {
+        let (inertia, rate, fifth, amplitude) = (0.1, 5.0, -3.0, 0.7_f64);
+        let energy = |q: f64| 0.25 * rate * q.powi(4) + fifth * q.powi(6) / 6.0;
+        let trial = Trial { parameters: [inertia, 0.0, 0.0, 1.0], position: amplitude, velocity: 0.0, step: 1e-3 };
+        let motion = trial.follow(&CubicStiffness, 1, &[rate, fifth], &vec![0.0; 20_000]);
+        let fastest = motion.iter().map(|m| m.velocity.abs()).fold(0.0, f64::max);
+        let expected = (2.0 * energy(amplitude) / inertia).sqrt();
+        assert!((fastest / expected - 1.0).abs() < 1e-3, "{fastest} rad/s, expected {expected} rad/s");
     }
 }

@@ -50,7 +50,7 @@ impl Drawn {
                 continue;
             }
             let motion = P::motion(state);
-            let midway = motion.position + 0.5 * tick.step * motion.velocity;
+            let midway = motion.midway(tick.step);
             // It must not be stiffer than a step can follow: by then it is dry friction in all but name.
             let least = torque * tick.step * tick.step / P::inertia(scene.dynamics, lane, state);
             let drawn = memory.get_or_insert(Place { position: motion.position, level: 0.0 });

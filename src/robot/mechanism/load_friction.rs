@@ -121,7 +121,7 @@ impl Gears {
 #[inline]
 fn efforts<P: Mover>(tick: Tick, scene: &Scene<'_, P>, lane: usize, state: &P::State) -> (f64, f64) {
     let motion = P::motion(state);
-    let midway = motion.position + 0.5 * tick.step * motion.velocity;
+    let midway = motion.midway(tick.step);
     let external = P::external(scene.dynamics, lane, state, midway);
     (P::drive(scene.dynamics, lane, state, &scene.commands[lane]), external)
 }

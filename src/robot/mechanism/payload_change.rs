@@ -87,7 +87,7 @@ impl Payload {
         let share = left / (1.0 + inertia * (1.0 - left));
         let state = &scene.states[lane];
         let motion = P::motion(state);
-        let midway = motion.position + 0.5 * tick.step * motion.velocity;
+        let midway = motion.midway(tick.step);
         let push = P::push(effect);
         push.inertia += share * inertia * P::inertia(scene.dynamics, lane, state);
         if gravity != 0.0 {

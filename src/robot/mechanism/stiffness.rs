@@ -60,7 +60,7 @@ impl<P: Mover> Law<P> for BentSpring {
         for ((effect, state), (rate, third)) in lanes {
             let motion = P::motion(state);
             // Springs act from where the coordinate is in the middle of the step.
-            let midway = motion.position + 0.5 * tick.step * motion.velocity;
+            let midway = motion.midway(tick.step);
             P::push(effect).stiffness += rate + third * midway * midway;
         }
     }

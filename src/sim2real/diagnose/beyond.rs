@@ -1,47 +1,91 @@
 //! Beyond: whether a law that was fitted up to the edge of what goes by its name would go on from there.
 //!
 //! Some laws become another beyond a point: a friction that grows with velocity over most of what is usual is not dry any more. So each
-//! is sought within what goes by its name. One that ended at that edge, and would explain more beyond it, is not what is missing; and if
+//! is sought within what goes by its name. One that would explain more beyond that, in whatever form, is not what is missing; and if
 //! another of the registry were, that would have been found to do better.
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::{ACCEPT, Selection};
 use super::weigh::{lead, squares};
-use crate::sim2real::Twin;
+use crate::sim2real::identify::Effort;
+use crate::sim2real::{Candidate, Parameter, Twin};
 
 /// Whether the law that explains most of all that were selected would go on beyond what goes by its name.
 pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> bool {
     let selected = &selection.selected;
     let left: Vec<f64> = selection.without.iter().map(squares).collect();
     let Some(place) = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b])) else { return false };
-    opened(inquiry, selected, place).is_some_and(|twin| {
-        let further = inquiry.followed_as(twin, selected);
+    let own = &inquiry.candidates[selected.added[place]];
+    let forms = inquiry.candidates.iter().enumerate().filter(|(_, other)| other.about.name == own.about.name);
+    let opened = forms.filter_map(|(number, form)| Opened::of(inquiry, selected, place, (number, form)));
+    opened.into_iter().any(|opened| {
+        let further = opened.followed(inquiry, selected, place);
         lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT
     })
 }
 
-/// The twin of `selected`, whose `place`-th law may go on where it ended at the edge of what goes by its name; none where it did not.
-fn opened<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, place: usize) -> Option<T> {
-    let mut twin = inquiry.twin.clone();
-    let mut open = false;
-    for (k, number) in selected.added.iter().enumerate() {
-        let mut candidate = inquiry.candidates[*number].clone();
-        if k == place {
-            let first = twin.parameters().len();
-            let parameters = candidate.form.parameters.iter_mut().zip(&candidate.bounds).enumerate();
-            for (k, (parameter, [lower, upper])) in parameters.filter(|(k, _)| selected.fit.at_bound.contains(&(first + k)))
-            {
-                let before = [parameter.lower, parameter.upper];
-                let below = selected.fit.values[first + k] <= parameter.lower;
-                if below {
-                    parameter.lower = *lower
-                } else {
-                    parameter.upper = *upper
-                }
-                open |= before != [parameter.lower, parameter.upper];
+/// A form of a law that may go on beyond what goes by its name, and where it begins: at that edge.
+struct Opened {
+    number: usize,
+    form: Candidate,
+    start: Vec<f64>,
+}
+
+impl Opened {
+    /// `form`, of which the `place`-th law of `selected` is one or another; none where it did not come to an edge, or has none.
+    fn of<T: Twin>(
+        inquiry: &Inquiry<'_, T>,
+        selected: &Hypothesis<T>,
+        place: usize,
+        (number, form): (usize, &Candidate),
+    ) -> Option<Self> {
+        let own = selected.added[place];
+        let values = &selected.fit.values[own_values(inquiry, selected, place)];
+        let known = &inquiry.candidates[own].form.parameters;
+        let mut form = form.clone();
+        let mut open = false;
+        let mut start = Vec::new();
+        for (k, (parameter, bounds)) in form.form.parameters.iter_mut().zip(&form.bounds).enumerate() {
+            // Other forms begin with what they have in common with the one that was fitted.
+            let fitted = known.get(k).filter(|same| same.unit == parameter.unit).map(|_| values[k]);
+            let edge = edge(parameter, bounds, fitted.filter(|_| number == own));
+            start.push(edge.or(fitted).unwrap_or(parameter.nominal));
+            if edge.is_some() {
+                open = true;
+                [parameter.lower, parameter.upper] = *bounds;
             }
         }
-        twin = twin.with(&candidate);
+        open.then_some(Self { number, form, start })
     }
-    open.then_some(twin)
+
+    /// `selected` with this in the place of its `place`-th law.
+    fn followed<T: Twin>(&self, inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, place: usize) -> Hypothesis<T> {
+        let mut twin = inquiry.twin.clone();
+        let mut added = selected.added.clone();
+        added[place] = self.number;
+        for (k, number) in added.iter().enumerate() {
+            twin = twin.with(if k == place { &self.form } else { &inquiry.candidates[*number] });
+        }
+        let mut values = selected.fit.values.clone();
+        values.splice(own_values(inquiry, selected, place), self.start.iter().copied());
+        inquiry.begun(twin, added, &values, Some(&selected.fit.state), Effort::Thorough)
+    }
+}
+
+/// The edge of what goes by the name of a `parameter` that may have any value within `bounds`, if one that was `fitted` came to it.
+fn edge(parameter: &Parameter, [lower, upper]: &[f64; 2], fitted: Option<f64>) -> Option<f64> {
+    let below = parameter.lower > *lower && fitted.is_none_or(|value| value <= parameter.lower);
+    let above = parameter.upper < *upper && fitted.is_none_or(|value| value >= parameter.upper);
+    match (below, above) {
+        (_, true) => Some(parameter.upper),
+        (true, false) => Some(parameter.lower),
+        (false, false) => None,
+    }
+}
+
+/// Where the parameters of the `place`-th law of `selected` stand.
+fn own_values<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, place: usize) -> std::ops::Range<usize> {
+    let count = |number: &usize| inquiry.candidates[*number].form.parameters.len();
+    let from = inquiry.twin.parameters().len() + selected.added[..place].iter().map(count).sum::<usize>();
+    from..from + count(&selected.added[place])
 }

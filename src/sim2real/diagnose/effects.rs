@@ -2,10 +2,10 @@
 
 use super::Found;
 use super::confidence::{Doubts, by_evidence, calibrated};
+use super::decision::{Findings, held_out_remainder};
 use super::diagnosis::{Effect, Estimate, Rival};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::Place;
-use super::verdict::{Findings, held_out_remainder};
 use super::weigh::plausibility;
 use crate::sim2real::{Candidate, Parameter, Twin};
 

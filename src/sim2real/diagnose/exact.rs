@@ -1,8 +1,8 @@
 //! Channels without noise, such as fees: where they are explained, and what may be left of them.
 
+use super::decision::ABOVE_THE_NOISE;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::Selection;
-use super::verdict::ABOVE_THE_NOISE;
 use crate::sim2real::Twin;
 use crate::sim2real::identify::{Block, Fit};
 

@@ -55,6 +55,11 @@ impl<T> Hypothesis<T> {
         !self.leaves_nothing() && !self.misfits.iter().all(ChannelMisfit::like_noise)
     }
 
+    /// The same of noise that certainly is noise: a twin that leaves that is not bent by what it lacks.
+    pub(super) fn unbent(&self, times: f64) -> bool {
+        self.within(times) && self.misfits.iter().all(|m| m.level <= 1.0 || m.one_colour)
+    }
+
     /// Whether the mean square of what is left is at most `times` that of the noise, whatever its colour.
     pub(super) fn within(&self, times: f64) -> bool {
         self.misfits.iter().all(|m| m.within(times, m.level))
@@ -181,20 +186,19 @@ impl<T: Twin> Inquiry<'_, T> {
     /// The same, as far as `effort` goes.
     pub fn followed_on(&self, hypothesis: &Hypothesis<T>, effort: Effort) -> Hypothesis<T> {
         let twin = hypothesis.added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]));
-        let start = std::slice::from_ref(&hypothesis.fit.values);
-        self.fitted(twin, hypothesis.added.clone(), start, Some(&hypothesis.fit.state), effort)
-    }
-
-    /// `hypothesis` refitted with a `twin` of the same parameters, which may have other bounds.
-    pub fn followed_as(&self, twin: T, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
-        let start = std::slice::from_ref(&hypothesis.fit.values);
-        self.fitted(twin, hypothesis.added.clone(), start, Some(&hypothesis.fit.state), Effort::Thorough)
+        let Hypothesis { added, fit, .. } = hypothesis;
+        self.begun(twin, added.clone(), &fit.values, Some(&fit.state), effort)
     }
 
     /// `hypothesis` refitted where the recordings are divided in another way than they were for it.
     pub fn refitted_afresh(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
-        let start = std::slice::from_ref(&hypothesis.fit.values);
-        self.fitted(hypothesis.twin.clone(), hypothesis.added.clone(), start, None, Effort::Thorough)
+        let Hypothesis { twin, added, fit, .. } = hypothesis;
+        self.begun(twin.clone(), added.clone(), &fit.values, None, Effort::Thorough)
+    }
+
+    /// `twin`, which has what is `added`, fitted from these `values` on, and from `state` if that is known of the same parts.
+    pub fn begun(&self, twin: T, added: Vec<usize>, values: &[f64], state: Option<&State>, effort: Effort) -> Hypothesis<T> {
+        self.fitted(twin, added, &[values.to_vec()], state, effort)
     }
 
     /// The best fit of `twin` from several starts.

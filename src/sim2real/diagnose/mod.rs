@@ -5,8 +5,8 @@
 //! by their signatures; `select` fits and compares sets of them, `weigh`ed by the evidence that `whiteness` counts, and `forms` finds
 //! for each the form that does best beside the others; `rivals` looks for other names, `carry_over` asks the one recording of
 //! what explains little in the other, and `confidence` says how sure one is;
-//! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out; `verdict`
-//! weighs it all, and `words` tells it. `gates` says how long steps of integration may be, and `recognize` sees what needs no
+//! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out; the `decision`
+//! rests on all of it, and `verdict` and `words` tell it. `gates` says how long steps of integration may be, and `recognize` sees what needs no
 //! fit. `locate` and `onset` say where and since when the twin is off, `activity` when what was named acted, and `experiment`
 //! designs, from the commands of `excitation`, what to record where rivals are left. Where recordings show several things that no
 //! mechanism has in common, each of these `aspects` goes through all of it by itself.
@@ -19,6 +19,7 @@ mod carry_over;
 mod changes;
 mod confidence;
 mod crossings;
+mod decision;
 mod diagnosis;
 mod effects;
 mod evidence;
@@ -268,8 +269,8 @@ fn followed(
     let known = shown(&trued, selection.selected.twin.parameters());
     let depends = remainder::dependences(&inquiry, &selection.selected);
     let fits = prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed);
-    let refuted = verdict::refuted(&inquiry, &selection, &fits);
-    let findings = verdict::Findings {
+    let refuted = decision::refuted(&inquiry, &selection, &fits);
+    let findings = decision::Findings {
         fits,
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
         // Of what is refuted nothing was explained.

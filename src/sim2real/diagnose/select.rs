@@ -373,7 +373,7 @@ fn chosen<T: Twin>(
         -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && benefit * explained > needed
     };
     let near = parent.added.is_empty() || parent.within(NEARLY_ALL);
-    let all = place == 0 && near && !parent.leaves_nothing() && !parent.within(UNBENT);
+    let all = place == 0 && near && !parent.leaves_nothing() && !parent.unbent(UNBENT);
     let most = FITTED;
     let mut mechanisms: Vec<&str> = Vec::new();
     screened

@@ -226,6 +226,7 @@ pub(super) mod tests {
             count,
             autocorrelation_time: count as f64 / effective,
             level: 1.0,
+            one_colour: true,
         };
         let fit = Fit {
             values: Vec::new(),

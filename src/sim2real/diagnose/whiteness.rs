@@ -20,6 +20,9 @@ pub(super) struct ChannelMisfit {
     /// Mean square that noise of the colour of these residuals leaves, in units of the noise floor: 1 where they are white,
     /// or too slow to be noise. The floor is found from differences of neighbouring rows, and coloured noise hides in them.
     pub level: f64,
+    /// Whether they fall out of correlation at one rate, as noise of one origin does: beside a motion that something is missing from they
+    /// fall fast at first, and then slowly.
+    pub one_colour: bool,
 }
 
 impl ChannelMisfit {
@@ -35,7 +38,7 @@ impl ChannelMisfit {
 
     /// Whether it is of the size and the colour of coloured noise: then nothing more need be sought in it.
     pub fn like_noise(&self) -> bool {
-        self.level > 1.0 && self.within(1.0 + BY_CHANCE, self.level)
+        self.level > 1.0 && self.one_colour && self.within(1.0 + BY_CHANCE, self.level)
     }
 
     /// Whether the mean square is at most `times` that of noise of mean square `level`.
@@ -69,6 +72,7 @@ pub(super) fn channel_misfits(residual: &[f64], blocks: &[Block], rounding: impl
                 sum_of_squares,
                 count,
                 autocorrelation_time: 1.0 + coloured * (time - 1.0),
+                one_colour: covariance.as_ref().is_none_or(|c| of_one_colour(c, count)),
                 level: match covariance {
                     Some(c) if mean_square < MOST_HIDDEN && coloured_like_noise(&c) => {
                         (mean_square * (1.0 - remembered(&c))).max(1.0)
@@ -120,6 +124,27 @@ fn coloured_like_noise(covariance: &[f64]) -> bool {
     }
     let rho = |lag: usize| covariance[lag] / covariance[0];
     rho(NEAR_LAG) > WHITE && rho(FAR_LAG) < rho(NEAR_LAG) * (1.0 - FORGETS).powi((FAR_LAG - NEAR_LAG) as i32)
+}
+
+/// Lags at which noise of one colour is held to what its first two lags foretell.
+const HELD_TO: [usize; 3] = [12, 24, 36];
+/// Of these, correlations that differ by no more than this, or this many standard deviations of what so many rows tell of a process that
+/// remembers itself so long (Bartlett, JRSS Supplement 8 (1946)), are as foretold.
+const AS_FORETOLD: f64 = 0.1;
+const DEVIATIONS: f64 = 2.0;
+
+/// Whether residuals, so many in all, fall out of correlation as a first-order process does, with white noise beside it: by the same part
+/// from each row to the next.
+fn of_one_colour(covariance: &[f64], count: usize) -> bool {
+    let Some(&[whole, first, second]) = covariance.first_chunk() else { return true };
+    let kept = (second / first).clamp(0.0, 0.999);
+    let remembers = (1.0 + kept) / (1.0 - kept);
+    let apart = AS_FORETOLD.max(DEVIATIONS * (remembers / count.max(1) as f64).sqrt());
+    let foretold = |lag: usize| first / whole * kept.powi(lag as i32 - 1);
+    HELD_TO
+        .iter()
+        .filter_map(|lag| Some((*lag, covariance.get(*lag)?)))
+        .all(|(lag, c)| (c / whole - foretold(lag)).abs() <= apart)
 }
 
 /// Noise of any colour has forgotten itself after so many rows, ...
@@ -221,6 +246,22 @@ mod tests {
         let both: Vec<f64> = coloured.iter().enumerate().map(|(i, n)| n + 2.0 * (i as f64 * 0.003).sin()).collect();
         let found = level(&both) * (1.0 - 0.8 * 0.8);
         assert!((found - 1.0).abs() < 0.3, "{found}");
+    }
+
+    #[test]
+    fn noise_falls_out_of_correlation_at_one_rate() {
+        let of = |series: &[f64]| {
+            let block = Block { part: 0, channel: "y".into(), range: 0..series.len(), rows: (0..series.len()).collect() };
+            let misfit = channel_misfits(series, &[block], |_| 0.0).remove(0);
+            (misfit.level > 1.0, misfit.one_colour)
+        };
+        for phi in [0.5, 0.7, 0.9, 0.95] {
+            assert_eq!(of(&autoregressive(phi, 5_000)), (true, true), "{phi}");
+        }
+        // Beside half as much of something that swings slowly it goes for noise, and not for noise of one colour.
+        let coloured = autoregressive(0.6, 5_000);
+        let both: Vec<f64> = coloured.iter().enumerate().map(|(i, n)| n + 0.9 * (i as f64 * 0.06).sin()).collect();
+        assert_eq!(of(&both), (true, false));
     }
 
     #[test]

@@ -1,0 +1,343 @@
+//! The decision: named, ambiguous, unexplained, not excited or no mismatch.
+
+use super::diagnosis::{ChannelFit, Effect, Verdict};
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::remainder::{NEAR_THE_NOISE, dependences, strongest};
+use super::select::Selection;
+use super::structure::Dependence;
+use super::whiteness::ChannelMisfit;
+use crate::sim2real::identify::Fit;
+use crate::sim2real::{Clock, Twin};
+
+/// A remainder above this part of the first misfit is more than an error of form.
+const FORM_ERROR: f64 = 0.10;
+/// Close to the noise a remainder on held-out data is known less well: above this part it is more than an error of form.
+const MOSTLY_LEFT: f64 = 0.35;
+/// The mean square of the noise is known to this factor.
+const NOISE_KNOWN: f64 = 1.05;
+/// A residual counts as structured where a covariate's F test is this strong (-log10 p): complete models reach 5.
+pub(super) const DEPENDENT: f64 = 6.5;
+/// A residual counts as structured where a regression foretells this part of it on held-out data.
+pub(super) const FORETOLD: f64 = 0.10;
+/// Where this part of it is foretold, what is left is physics, however small it is beside what was found.
+const FORETOLD_WELL: f64 = 0.25;
+/// A twin whose mean squared residual is this many times the noise does not explain the recordings, whether or not
+/// anything foretells what is left.
+const FAR_ABOVE_THE_NOISE: f64 = 9.0;
+/// A twin to which nothing can be added and whose mean squared residual is this many times the noise lacks something unknown.
+pub(super) const ABOVE_THE_NOISE: f64 = 2.0;
+/// So does what is slower than noise, so many rows and more, and leaves this many times the noise.
+const SLOW: f64 = 5.0;
+const SLOWLY_ABOVE: f64 = 1.3;
+/// What a regression foretells counts where the mean squared residual is more than this many times the noise.
+const HARDLY_ABOVE: f64 = 1.2;
+/// Noise does not grow from one recording to another: a mean squared residual this many times that of the fitted rows is something else, ...
+const GROWN: f64 = 1.3;
+/// ... beyond so many standard deviations of its logarithm by chance.
+const BY_CHANCE: f64 = 3.0;
+/// With fewer rows than this, what is not explained is not called explained either.
+const FEWEST_ROWS: usize = 50;
+/// Larger by less than this, an error is as large.
+const WORSE: f64 = 1.02;
+/// What is less likely than this to be the library's is not said to be.
+const HARDLY_THE_LIBRARY: f64 = 0.1;
+/// The same of a single name, and of what does not carry over to held-out data either.
+const LIKELIER_THAN_NOT: f64 = 0.5;
+/// A name less certain than this is ambiguous.
+const CERTAIN: f64 = 0.7;
+
+/// Everything a verdict rests on.
+pub(super) struct Findings {
+    pub fits: Vec<ChannelFit>,
+    pub placebo_p: Option<f64>,
+    pub remainder: f64,
+    /// Whether the trued twin follows what was fitted in free run too, and not on windows alone.
+    pub followed: bool,
+    pub dependence: Option<Dependence>,
+    pub foretold: f64,
+    pub std: Vec<f64>,
+    pub trued: Fit,
+    /// Whether rows are samples of signals, rather than messages.
+    pub sampled: bool,
+    /// Whether what knows no noise is off.
+    pub inexact: bool,
+    /// Whether a law that was named would go on beyond what goes by its name.
+    pub beyond: bool,
+    /// Whether what was named of messages is refuted by others, though something is missing.
+    pub refuted: bool,
+}
+
+/// Whether what was named of messages does worse than nothing on those held out, while without it they depend on something: what was
+/// fitted is not what is missing.
+pub(super) fn refuted<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, fits: &[ChannelFit]) -> bool {
+    let messages = inquiry.twin.clock() == Clock::Event && !selection.selected.added.is_empty();
+    messages
+        && !fits.iter().any(|fit| fit.improvement_ci95[0] > 0.0)
+        && fits.iter().any(worse)
+        && strongest(&dependences(inquiry, &selection.recalibrated)).is_some_and(|d| d.strength > DEPENDENT)
+}
+
+fn structured(findings: &Findings) -> bool {
+    findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
+}
+
+/// The part of the recalibrated misfit above the noise that is left on held-out data; the noise is known to
+/// [`NOISE_KNOWN`].
+pub(super) fn held_out_remainder(fit: &ChannelFit) -> f64 {
+    let above = |rmse: f64, known: f64| (rmse * rmse - known * fit.noise_floor * fit.noise_floor).max(0.0);
+    let misfit = above(fit.recalibrated_rmse, 1.0);
+    if misfit > 0.0 { above(fit.trued_rmse, NOISE_KNOWN) / misfit } else { 0.0 }
+}
+
+/// Whether so much is left on held-out signals that what was named does not explain them.
+fn fails_unseen(fit: &ChannelFit) -> bool {
+    let remainder = held_out_remainder(fit);
+    far_off(fit) && remainder > FORM_ERROR || remainder > MOSTLY_LEFT
+}
+
+/// Whether the recalibrated twin leaves more than the noise on held-out data.
+fn above_the_noise(fit: &ChannelFit) -> bool {
+    fit.recalibrated_rmse * fit.recalibrated_rmse > HARDLY_ABOVE * fit.noise_floor * fit.noise_floor
+}
+
+/// Whether what was named does worse on held-out data than nothing.
+fn worse(fit: &ChannelFit) -> bool {
+    fit.trued_rmse > WORSE * fit.recalibrated_rmse
+}
+
+/// The probability that everything named, or one of its rivals each time, is what is missing: the more that is named and
+/// the less sure, the likelier it is that all of it stands for one thing that is in no registry.
+fn library(effects: &[Effect]) -> f64 {
+    let known = |e: &Effect| (e.confidence + e.rivals.iter().map(|r| r.confidence).sum::<f64>()).min(1.0);
+    effects.iter().map(known).product()
+}
+
+/// How likely it must be at least that what was named is the library's; `unseen` is whether it fails on held-out data.
+fn least_likely(effects: &[Effect], unseen: bool) -> f64 {
+    match effects {
+        // What the fitted data leave no doubt of is right although its form does not carry over to others.
+        _ if unseen => CERTAIN,
+        // One name alone is right or it is not; of several each may be, with another of the others.
+        [_] => LIKELIER_THAN_NOT,
+        _ => HARDLY_THE_LIBRARY,
+    }
+}
+
+/// Whether what is left on held-out data stands far above the noise.
+fn far_off(fit: &ChannelFit) -> bool {
+    fit.trued_rmse * fit.trued_rmse > FAR_ABOVE_THE_NOISE * fit.noise_floor * fit.noise_floor
+}
+
+/// What is to be said.
+pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: &Findings) -> Verdict {
+    let floor = |times: f64| selection.selected.misfits.iter().all(|m| m.within(times, 1.0));
+    // Of messages it is known of which of them it is asked.
+    let left_over = structured(findings) && (!findings.sampled || !selection.selected.within(HARDLY_ABOVE))
+        || findings.foretold > FORETOLD_WELL && !floor(HARDLY_ABOVE);
+    if effects.is_empty() {
+        let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
+        // Messages have noise of their own beside the rounding of what they tell: it alone is nothing that is missing.
+        let above = !selection.selected.within(ABOVE_THE_NOISE) || selection.selected.misfits.iter().any(slowly_above);
+        return match left_over || findings.inexact || findings.sampled && above {
+            _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(NEAR_THE_NOISE)) => Verdict::NotExcited,
+            true => Verdict::Unexplained,
+            false if findings.sampled => unseen_there(&selection.selected, findings),
+            false => Verdict::NoMismatch,
+        };
+    }
+    if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
+        let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
+        let visible = findings.fits.iter().any(above_the_noise);
+        return match findings.sampled {
+            true => unconfirmed(library(effects), clean, visible),
+            false => unconfirmed_by_messages(findings.refuted, left_over, findings.remainder),
+        };
+    }
+    let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
+    let doubtful = findings.sampled && library(effects) < least_likely(effects, unseen);
+    let unexplained = left_over || findings.inexact;
+    if doubtful || findings.beyond || unexplained && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
+        return Verdict::Unexplained;
+    }
+    if unseen || effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
+}
+
+/// Whether more than noise is left of a channel, and slower than noise.
+fn slowly_above(misfit: &ChannelMisfit) -> bool {
+    !misfit.within(SLOWLY_ABOVE, misfit.level) && misfit.autocorrelation_time > SLOW
+}
+
+/// What is said where fitted signals show nothing, of what held-out ones show.
+///
+/// What is clean where it was fitted and off elsewhere was not moved enough to be told. But noise is no louder where a plant is moved
+/// otherwise: what went for the noise of another colour, and grows, is something unknown.
+fn unseen_there<T>(selected: &Hypothesis<T>, findings: &Findings) -> Verdict {
+    let clean = findings.followed && selected.within(NEAR_THE_NOISE);
+    let coloured = selected.misfits.iter().any(|misfit| misfit.level > 1.0);
+    match (findings.fits.iter().any(far_off), findings.fits.iter().any(|fit| grown(fit, selected))) {
+        (true, _) if clean => Verdict::NotExcited,
+        (true, _) => Verdict::Unexplained,
+        (false, true) if clean && coloured => Verdict::Unexplained,
+        (false, true) if clean => Verdict::NotExcited,
+        _ => Verdict::NoMismatch,
+    }
+}
+
+/// Whether more is left of held-out rows than noise leaves that leaves as much as this of the fitted ones.
+fn grown<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
+    let Some(own) = selected.misfits.iter().find(|misfit| misfit.channel == fit.channel) else { return false };
+    let fitted = (own.sum_of_squares / (own.level * own.count.max(1) as f64)).max(1.0);
+    // As much is held out as was fitted, or about that.
+    let by_chance = (BY_CHANCE * 2.0 / own.effective().max(1.0).sqrt()).exp();
+    fit.recalibrated_rmse.powi(2) > GROWN.max(by_chance) * fitted * fit.noise_floor.powi(2)
+}
+
+/// What is said of names that held-out signals do not confirm: `known` is how likely it is that they are the library's, `clean` whether
+/// the fitted data are explained, and `visible` whether the recalibrated twin is off on the held-out ones.
+///
+/// Held-out data that part at a bounce or slip a pole speak neither for nor against what the fitted ones leave no doubt of. Where
+/// these leave doubts and the twin is off all the same, or where no name is believed, something else is missing. The rest was never
+/// moved enough to be told.
+fn unconfirmed(known: f64, clean: bool, visible: bool) -> Verdict {
+    match known {
+        _ if !clean => Verdict::Unexplained,
+        _ if known >= CERTAIN => Verdict::Ambiguous,
+        _ if visible || known < HARDLY_THE_LIBRARY => Verdict::Unexplained,
+        _ => Verdict::NotExcited,
+    }
+}
+
+/// The same of messages. Where as much as before depends on something, with what was named, that is not what these messages depend on,
+/// and they do depend on something.
+fn unconfirmed_by_messages(refuted: bool, left_over: bool, remainder: f64) -> Verdict {
+    if refuted || left_over && remainder > FORM_ERROR { Verdict::Unexplained } else { Verdict::NotExcited }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    use crate::sim2real::Site;
+    use crate::sim2real::diagnose::diagnosis::Rival;
+
+    fn effect(confidence: f64, rivals: &[f64]) -> Effect {
+        let rival = |c: &f64| Rival { mechanism: "rival".into(), confidence: *c };
+        Effect {
+            mechanism: "own".into(),
+            site: Site::Plant,
+            confidence,
+            gain: None,
+            margin: None,
+            parameters: BTreeMap::new(),
+            rivals: rivals.iter().map(rival).collect(),
+            location: None,
+            active: Vec::new(),
+            moved: Vec::new(),
+        }
+    }
+
+    fn error(recalibrated_rmse: f64, trued_rmse: f64) -> ChannelFit {
+        ChannelFit {
+            channel: "position".into(),
+            unit: "rad".into(),
+            noise_floor: 1.0,
+            nominal_rmse: 20.0,
+            recalibrated_rmse,
+            trued_rmse,
+            nominal_mae: 20.0,
+            recalibrated_mae: recalibrated_rmse,
+            trued_mae: trued_rmse,
+            improvement_ci95: [0.0, 0.0],
+        }
+    }
+
+    #[test]
+    fn a_rival_is_of_the_library_and_many_unsure_names_are_not() {
+        assert!((library(&[effect(0.5, &[0.4])]) - 0.9).abs() < 1e-12);
+        assert_eq!(library(&[effect(0.6, &[0.6])]), 1.0);
+        assert!(library(&[effect(0.9, &[]), effect(0.3, &[]), effect(0.2, &[])]) < HARDLY_THE_LIBRARY);
+        assert_eq!(library(&[]), 1.0);
+    }
+
+    #[test]
+    fn one_name_alone_must_be_likelier_than_not() {
+        let says = |effects: &[Effect], unseen: bool| library(effects) >= least_likely(effects, unseen);
+        assert!(!says(&[effect(0.4, &[])], false) && says(&[effect(0.4, &[0.2])], false), "its rivals count");
+        assert!(says(&[effect(0.4, &[]), effect(0.9, &[])], false), "of several, one may be right");
+        assert!(!says(&[effect(0.6, &[])], true) && says(&[effect(0.8, &[])], true), "what fails unseen must be certain");
+    }
+
+    #[test]
+    fn what_held_out_data_do_not_confirm_is_as_sure_as_the_fitted_ones_make_it() {
+        assert_eq!(
+            unconfirmed(0.74, true, true),
+            Verdict::Ambiguous,
+            "an end stop, and a held-out run that parts at a bounce"
+        );
+        assert_eq!(unconfirmed(0.57, true, true), Verdict::Unexplained, "a shaking that a compliance hardly is");
+        assert_eq!(unconfirmed(0.0, true, false), Verdict::Unexplained, "nobody believes it");
+        assert_eq!(unconfirmed(0.3, true, false), Verdict::NotExcited, "nothing is off where it was not fitted");
+        assert_eq!(unconfirmed(0.9, false, true), Verdict::Unexplained, "what fits neither past nor future");
+    }
+
+    #[test]
+    fn noise_is_no_louder_elsewhere() {
+        use crate::sim2real::diagnose::weigh::tests::leaving;
+        let findings = |held_out: f64| Findings {
+            fits: vec![error(held_out.sqrt(), held_out.sqrt())],
+            placebo_p: None,
+            remainder: 0.0,
+            followed: true,
+            dependence: None,
+            foretold: 0.0,
+            std: Vec::new(),
+            trued: leaving(1.0, 6_000.0).fit,
+            sampled: true,
+            inexact: false,
+            beyond: false,
+            refuted: false,
+        };
+        let white = leaving(1.0, 6_000.0);
+        assert_eq!(unseen_there(&white, &findings(1.2)), Verdict::NoMismatch);
+        assert_eq!(
+            unseen_there(&white, &findings(1.5)),
+            Verdict::NotExcited,
+            "a saturation that is reached elsewhere alone"
+        );
+        // What a floor of 1 stands for is the noise with its colour.
+        let mut coloured = leaving(7.0, 400.0);
+        coloured.misfits[0].level = 7.0;
+        assert_eq!(unseen_there(&coloured, &findings(1.3)), Verdict::NoMismatch, "of so few it may be chance");
+        assert_eq!(unseen_there(&coloured, &findings(1.9)), Verdict::Unexplained, "a bent shaft, and no noise");
+        assert_eq!(unseen_there(&coloured, &findings(50.0)), Verdict::NotExcited, "a pole that slips");
+        assert!(slowly_above(&leaving(1.4, 400.0).misfits[0]), "a base that shakes a little");
+        assert!(!slowly_above(&leaving(1.4, 3_000.0).misfits[0]), "and noise that hardly remembers itself");
+    }
+
+    #[test]
+    fn messages_that_still_depend_on_something_have_not_been_explained() {
+        assert_eq!(
+            unconfirmed_by_messages(false, true, 1.0),
+            Verdict::Unexplained,
+            "a dealer that refuses what the market moves against, and a lot size that does not carry over"
+        );
+        assert_eq!(
+            unconfirmed_by_messages(false, true, 0.01),
+            Verdict::NotExcited,
+            "what depends on something is hardly any"
+        );
+        assert_eq!(unconfirmed_by_messages(false, false, 1.0), Verdict::NotExcited, "what is left is noise");
+        assert_eq!(unconfirmed_by_messages(true, false, 0.0), Verdict::Unexplained);
+    }
+
+    #[test]
+    fn errors_are_held_to_the_noise_and_to_each_other() {
+        assert!(worse(&error(2.0, 2.1)) && !worse(&error(2.0, 2.0)));
+        assert!(above_the_noise(&error(1.2, 1.0)) && !above_the_noise(&error(1.05, 1.0)));
+        assert!(far_off(&error(9.0, 3.1)) && !far_off(&error(9.0, 2.9)));
+        assert!(fails_unseen(&error(9.0, 3.1)), "a tenth of the misfit is left, far above the noise");
+        assert!(!fails_unseen(&error(9.0, 2.9)), "and close to it that is an error of form");
+        assert!(fails_unseen(&error(3.0, 2.0)), "unless it is a third");
+    }
+}
