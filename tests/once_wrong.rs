@@ -228,3 +228,27 @@ fn noise_that_grows_is_no_noise() {
         assert_eq!(tried(63, index).verdict, Verdict::NotExcited, "case {index}");
     }
 }
+
+/// A spring beside coloured noise: what the refit left went for noise, and of seven mechanisms that were tried a wrong scale was best.
+#[test]
+fn what_falls_out_of_correlation_twice_is_searched_through() {
+    let trial = tried(63, 149);
+    assert_eq!(names(&trial), ["stiffness"]);
+    assert!(trial.found[0].rivals.contains(&"scale".to_owned()), "{:?}", trial.found);
+}
+
+/// A bent shaft and a friction of one direction: of what was named instead a tenth and more was left, and slower than noise.
+#[test]
+fn what_is_left_slowly_is_not_explained() {
+    for (seed, index) in [(51, 20), (63, 71)] {
+        assert_eq!(tried(seed, index).verdict, Verdict::Unexplained, "seed {seed}, case {index}");
+    }
+}
+
+/// What a coarse integrator does to a joint that nothing is missing from: what was named for it does worse where nothing is needed.
+#[test]
+fn what_is_refuted_where_nothing_is_off_is_not_named() {
+    for index in [97, 130] {
+        assert_eq!(tried(61, index).verdict, Verdict::NotExcited, "case {index}");
+    }
+}

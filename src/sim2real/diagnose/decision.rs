@@ -5,7 +5,6 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::remainder::{NEAR_THE_NOISE, dependences, strongest};
 use super::select::Selection;
 use super::structure::Dependence;
-use super::whiteness::ChannelMisfit;
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Twin};
 
@@ -29,6 +28,8 @@ pub(super) const ABOVE_THE_NOISE: f64 = 2.0;
 /// So does what is slower than noise, so many rows and more, and leaves this many times the noise.
 const SLOW: f64 = 5.0;
 const SLOWLY_ABOVE: f64 = 1.3;
+/// Beside what was named that counts from this many times the noise on: it was fitted to leave as little as it can.
+const SLOWLY_LEFT: f64 = 1.1;
 /// What a regression foretells counts where the mean squared residual is more than this many times the noise.
 const HARDLY_ABOVE: f64 = 1.2;
 /// Noise does not grow from one recording to another: a mean squared residual this many times that of the fitted rows is something else, ...
@@ -36,7 +37,7 @@ const GROWN: f64 = 1.3;
 /// ... beyond so many standard deviations of its logarithm by chance.
 const BY_CHANCE: f64 = 3.0;
 /// With fewer rows than this, what is not explained is not called explained either.
-const FEWEST_ROWS: usize = 50;
+pub(super) const FEWEST_ROWS: usize = 50;
 /// Larger by less than this, an error is as large.
 const WORSE: f64 = 1.02;
 /// What is less likely than this to be the library's is not said to be.
@@ -137,7 +138,7 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
     if effects.is_empty() {
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
         // Messages have noise of their own beside the rounding of what they tell: it alone is nothing that is missing.
-        let above = !selection.selected.within(ABOVE_THE_NOISE) || selection.selected.misfits.iter().any(slowly_above);
+        let above = !selection.selected.within(ABOVE_THE_NOISE) || slowly_above(&selection.selected, SLOWLY_ABOVE);
         return match left_over || findings.inexact || findings.sampled && above {
             _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(NEAR_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
@@ -149,22 +150,23 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
         let visible = findings.fits.iter().any(above_the_noise);
         return match findings.sampled {
+            true if !visible && findings.fits.iter().any(|fit| fit.improvement_ci95[1] < 0.0) => Verdict::NotExcited,
             true => unconfirmed(library(effects), clean, visible),
             false => unconfirmed_by_messages(findings.refuted, left_over, findings.remainder),
         };
     }
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
     let doubtful = findings.sampled && library(effects) < least_likely(effects, unseen);
-    let unexplained = left_over || findings.inexact;
+    let unexplained = left_over || findings.inexact || findings.sampled && slowly_above(&selection.selected, SLOWLY_LEFT);
     if doubtful || findings.beyond || unexplained && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
         return Verdict::Unexplained;
     }
     if unseen || effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
 }
 
-/// Whether more than noise is left of a channel, and slower than noise.
-fn slowly_above(misfit: &ChannelMisfit) -> bool {
-    !misfit.within(SLOWLY_ABOVE, misfit.level) && misfit.autocorrelation_time > SLOW
+/// Whether more than so many times the noise is left of a channel, and slower than noise.
+fn slowly_above<T>(selected: &Hypothesis<T>, times: f64) -> bool {
+    selected.misfits.iter().any(|m| !m.within(times, m.level) && m.autocorrelation_time > SLOW)
 }
 
 /// What is said where fitted signals show nothing, of what held-out ones show.
@@ -192,7 +194,7 @@ fn grown<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
     fit.recalibrated_rmse.powi(2) > GROWN.max(by_chance) * fitted * fit.noise_floor.powi(2)
 }
 
-/// What is said of names that held-out signals do not confirm: `known` is how likely it is that they are the library's, `clean` whether
+/// What is said of names that held-out signals do not confirm, nor refute where nothing is off there: `known` is how likely it is that they are the library's, `clean` whether
 /// the fitted data are explained, and `visible` whether the recalibrated twin is off on the held-out ones.
 ///
 /// Held-out data that part at a bounce or slip a pole speak neither for nor against what the fitted ones leave no doubt of. Where
@@ -311,8 +313,8 @@ mod tests {
         assert_eq!(unseen_there(&coloured, &findings(1.3)), Verdict::NoMismatch, "of so few it may be chance");
         assert_eq!(unseen_there(&coloured, &findings(1.9)), Verdict::Unexplained, "a bent shaft, and no noise");
         assert_eq!(unseen_there(&coloured, &findings(50.0)), Verdict::NotExcited, "a pole that slips");
-        assert!(slowly_above(&leaving(1.4, 400.0).misfits[0]), "a base that shakes a little");
-        assert!(!slowly_above(&leaving(1.4, 3_000.0).misfits[0]), "and noise that hardly remembers itself");
+        assert!(slowly_above(&leaving(1.4, 400.0), SLOWLY_ABOVE), "a base that shakes a little");
+        assert!(!slowly_above(&leaving(1.4, 3_000.0), SLOWLY_ABOVE), "and noise that hardly remembers itself");
     }
 
     #[test]

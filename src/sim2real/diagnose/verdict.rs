@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Found;
-use super::decision::{DEPENDENT, FORETOLD, Findings, decide};
+use super::decision::{DEPENDENT, FEWEST_ROWS, FORETOLD, Findings, decide};
 use super::diagnosis::{Checks, Diagnosis, ParameterChange, SCHEMA, Score, Verdict, Where};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::Place;
@@ -65,6 +65,7 @@ pub(super) fn facts<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> w
         name: inquiry.twin.name(),
         tried: inquiry.candidates.iter().map(|candidate| (candidate.about.name, candidate.about.title)).collect(),
         fits: findings.fits.clone(),
+        few: findings.trued.residual.len() < FEWEST_ROWS,
         remainder: findings.remainder,
         dependence: findings.dependence.clone(),
     }

@@ -12,6 +12,8 @@ pub(super) struct Facts {
     pub tried: Vec<(&'static str, &'static str)>,
     /// Errors per channel.
     pub fits: Vec<ChannelFit>,
+    /// Whether fewer rows were fitted than can tell anything.
+    pub few: bool,
     /// The part of the misfit that is left.
     pub remainder: f64,
     /// What that depends on.
@@ -54,6 +56,10 @@ pub(super) fn summary(facts: &Facts, verdict: Verdict, effects: &[Effect]) -> St
         }
         Verdict::NoMismatch => format!(
             "The {name} explains the recordings once its own parameters are refitted: nothing is missing that these data show."
+        ),
+        Verdict::NotExcited if effects.is_empty() && !facts.few => format!(
+            "The {name} explains what was fitted and not what was held out: the fitted recordings do not move it enough to tell what that \
+             takes. Fit some that move it as far, as fast and as long."
         ),
         Verdict::NotExcited if effects.is_empty() => {
             format!("The {name} does not explain the recordings, and they are too few to tell what is missing: record more.")
