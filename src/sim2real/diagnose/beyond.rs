@@ -8,7 +8,7 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::select::{ACCEPT, Selection};
 use super::weigh::{lead, squares};
 use crate::sim2real::identify::Effort;
-use crate::sim2real::{Candidate, Parameter, Twin};
+use crate::sim2real::{Candidate, Clock, Parameter, Twin};
 
 /// Whether the law that explains most of all that were selected would go on beyond what goes by its name.
 pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> bool {
@@ -16,7 +16,12 @@ pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
     let left: Vec<f64> = selection.without.iter().map(squares).collect();
     let Some(place) = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b])) else { return false };
     let own = &inquiry.candidates[selected.added[place]];
-    let forms = inquiry.candidates.iter().enumerate().filter(|(_, other)| other.about.name == own.about.name);
+    // Of messages laws have the form they are written in.
+    let one_form = inquiry.twin.clock() == Clock::Event;
+    let forms = inquiry.candidates.iter().enumerate().filter(|(number, other)| match one_form {
+        true => *number == selected.added[place],
+        false => other.about.name == own.about.name,
+    });
     let opened = forms.filter_map(|(number, form)| Opened::of(inquiry, selected, place, (number, form)));
     opened.into_iter().any(|opened| {
         let further = opened.followed(inquiry, selected, place);

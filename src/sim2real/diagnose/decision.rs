@@ -142,8 +142,7 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
         return match left_over || findings.inexact || findings.sampled && above {
             _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(NEAR_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
-            false if findings.sampled => unseen_there(&selection.selected, findings),
-            false => Verdict::NoMismatch,
+            false => unseen_there(&selection.selected, findings),
         };
     }
     if !findings.fits.iter().any(|f| f.improvement_ci95[0] > 0.0) {
@@ -169,16 +168,17 @@ fn slowly_above<T>(selected: &Hypothesis<T>, times: f64) -> bool {
     selected.misfits.iter().any(|m| !m.within(times, m.level) && m.autocorrelation_time > SLOW)
 }
 
-/// What is said where fitted signals show nothing, of what held-out ones show.
+/// What is said where the fitted data show nothing, of what held-out ones show.
 ///
-/// What is clean where it was fitted and off elsewhere was not moved enough to be told. But noise is no louder where a plant is moved
-/// otherwise: what went for the noise of another colour, and grows, is something unknown.
+/// What is clean where it was fitted and off elsewhere was not moved enough to be told. But noise of signals is no louder where a plant is
+/// moved otherwise: what went for the noise of another colour, and grows, is something unknown.
 fn unseen_there<T>(selected: &Hypothesis<T>, findings: &Findings) -> Verdict {
     let clean = findings.followed && selected.within(NEAR_THE_NOISE);
     let coloured = selected.misfits.iter().any(|misfit| misfit.level > 1.0);
-    match (findings.fits.iter().any(far_off), findings.fits.iter().any(|fit| grown(fit, selected))) {
+    let grown = findings.sampled && findings.fits.iter().any(|fit| grown(fit, selected));
+    match (findings.fits.iter().any(far_off), grown) {
         (true, _) if clean => Verdict::NotExcited,
-        (true, _) => Verdict::Unexplained,
+        (true, _) if findings.sampled => Verdict::Unexplained,
         (false, true) if clean && coloured => Verdict::Unexplained,
         (false, true) if clean => Verdict::NotExcited,
         _ => Verdict::NoMismatch,
