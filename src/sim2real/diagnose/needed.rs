@@ -19,8 +19,10 @@ const DECISIVE: f64 = 50.0;
 const SHARE_OF_DECISIVE: f64 = 0.0003;
 /// What is of the size and colour of noise holds something besides, where so large a part of it is explained.
 const MORE_THAN_NOISE: f64 = 0.15;
-/// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many.
+/// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many, of so many in all, or with
+/// decisive evidence.
 const INFORMATIVE_ROWS: usize = 25;
+const MANY_ROWS: usize = 1000;
 /// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were;
 /// or take away so much of what they are off by, all together, that no less than so many of them tell of it.
 const FEW_ROWS: usize = 4;
@@ -110,7 +112,8 @@ pub(super) fn needed<T: Twin>(
     let few = restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64;
     let pairs: Vec<[f64; 2]> = (0..rows).map(|i| [less.fit.residual[i], whole.fit.residual[i]]).collect();
     let seen = inquiry.twin.clock() == Clock::Event && (few || takes_away(&pairs) || most_of_few(moved, rows));
-    let spread = rows > 40 * INFORMATIVE_ROWS && second * second >= INFORMATIVE_ROWS as f64 * fourth;
+    let many = rows > MANY_ROWS || gain(inquiry, less, whole) > DECISIVE;
+    let spread = many && second * second >= INFORMATIVE_ROWS as f64 * fourth;
     enough && (spread || seen || moved >= INFORMATIVE_ROWS)
 }
 
