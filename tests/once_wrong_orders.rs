@@ -78,3 +78,11 @@ fn what_other_orders_refute_is_something_unknown() {
 fn what_the_form_of_an_impact_is_off_by_is_no_second_impact() {
     assert_eq!(names(&tried(71, 5)), ["sqrt_impact"]);
 }
+
+/// A half spread that is below the noise of each of 469 orders: all together leave no doubt, and so few were never enough.
+#[test]
+fn what_few_orders_tell_together_is_told() {
+    let trial = tried(45, 118);
+    assert_eq!((names(&trial), trial.verdict), (vec!["half_spread"], Verdict::Named));
+    assert!(names(&tried(45, 33)).contains(&"half_spread"));
+}
