@@ -8,7 +8,7 @@
 use crate::market::feed::BarsAlone;
 use crate::market::venue::{Floor, Outcome, What};
 use crate::market::{
-    BacktestError, Bar, Cash, Event, EventKind, News, Notice, OrderId, Quantity, Rejection, Request, Sender, Side,
+    BacktestError, Bar, Cash, Event, EventKind, News, Notice, OpenOrder, OrderId, Quantity, Rejection, Request, Sender, Side,
 };
 use crate::market::{Strategy, Ticket};
 use crate::sim2real::Timestamp;
@@ -108,6 +108,8 @@ impl Session {
         self.agenda.passed(2);
         let floor = &mut self.venue.floors[instrument];
         let Some(filled) = floor.meet_open(id, side, quantity, &bar, row, decided.as_ref()) else {
+            // Part of it is still open when word of the rest comes.
+            self.known[instrument].opened(OpenOrder { id, side, kind: ticket.kind, left: quantity, closes: false });
             return self.settle(instrument);
         };
         // Word of it.
