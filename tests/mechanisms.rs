@@ -237,9 +237,16 @@ const CASES: &[Case] = &[
     },
     Case {
         mechanism: "cubic_stiffness",
-        form: "",
+        form: "cube",
         values: &[4.0],
         law: |_, x, u| plain(x, u, -4.0 * x[0].powi(3)),
+        most: 2e-5,
+    },
+    Case {
+        mechanism: "cubic_stiffness",
+        form: "bent",
+        values: &[4.0, -1.5],
+        law: |_, x, u| plain(x, u, -4.0 * x[0].powi(3) + 1.5 * x[0].powi(5)),
         most: 2e-5,
     },
     Case {
