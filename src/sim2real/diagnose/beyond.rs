@@ -22,8 +22,8 @@ pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
         true => *number == selected.added[place],
         false => other.about.name == own.about.name,
     });
-    let opened = forms.filter_map(|(number, form)| Opened::of(inquiry, selected, place, (number, form)));
-    opened.into_iter().any(|opened| {
+    let mut opened = forms.filter_map(|(number, form)| Opened::of(inquiry, selected, place, (number, form)));
+    opened.any(|opened| {
         let further = opened.followed(inquiry, selected, place);
         lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT
     })

@@ -194,8 +194,9 @@ fn grown<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
     fit.recalibrated_rmse.powi(2) > GROWN.max(by_chance) * fitted * fit.noise_floor.powi(2)
 }
 
-/// What is said of names that held-out signals do not confirm, nor refute where nothing is off there: `known` is how likely it is that they are the library's, `clean` whether
-/// the fitted data are explained, and `visible` whether the recalibrated twin is off on the held-out ones.
+/// What is said of names that held-out signals do not confirm, nor refute where nothing is off there: `known` is how likely it is that
+/// they are the library's, `clean` whether the fitted data are explained, and `visible` whether the recalibrated twin is off on the
+/// held-out ones.
 ///
 /// Held-out data that part at a bounce or slip a pole speak neither for nor against what the fitted ones leave no doubt of. Where
 /// these leave doubts and the twin is off all the same, or where no name is believed, something else is missing. The rest was never
