@@ -6,7 +6,7 @@ use crate::sim2real::{
 };
 
 use super::foresight::{self, Foresight};
-use super::{Book, InFlight, OrderLog, Role, ShownDelay, Side};
+use super::{following, Book, InFlight, OrderLog, Role, ShownDelay, Side};
 
 /// What an arriving order meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -281,6 +281,11 @@ impl Plant for Execution {
 
     fn notes(&self, recording: &Recording<OrderLog>) -> Vec<String> {
         recording.stimulus.notes().to_vec()
+    }
+
+    /// What is foreseen comes in any case.
+    fn contradicts(&self, recording: &Recording<OrderLog>, alphas: &[f64]) -> Option<String> {
+        if alphas.is_empty() { None } else { following::followed(&recording.stimulus, alphas) }
     }
 
     fn concerns(&self, site: Site, log: &OrderLog) -> bool {

@@ -35,6 +35,7 @@ pub mod env;
 mod equity_curve;
 mod execution;
 mod feed;
+mod following;
 mod foresight;
 mod halt;
 mod history;

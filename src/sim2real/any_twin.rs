@@ -116,6 +116,10 @@ impl<T: Twin> Simulator for Kind<T> {
         self.0.notes(self.own(recording))
     }
 
+    fn contradicts(&self, recording: &Recording<AnyStimulus>, initial: &[f64]) -> Option<String> {
+        self.0.contradicts(self.own(recording), initial)
+    }
+
     fn unit(&self, declared: &str) -> String {
         self.0.unit(declared)
     }
@@ -235,6 +239,10 @@ impl Simulator for AnyTwin {
 
     fn notes(&self, recording: &Recording<AnyStimulus>) -> Vec<String> {
         self.0.notes(recording)
+    }
+
+    fn contradicts(&self, recording: &Recording<AnyStimulus>, initial: &[f64]) -> Option<String> {
+        self.0.contradicts(recording, initial)
     }
 
     fn unit(&self, declared: &str) -> String {

@@ -212,6 +212,10 @@ impl<P: Plant> Simulator for Assembly<P> {
         self.plant.covariates(recording)
     }
 
+    fn contradicts(&self, recording: &Recording<P::Stimulus>, initial: &[f64]) -> Option<String> {
+        self.plant.contradicts(recording, initial)
+    }
+
     fn aspects(&self, recording: &Recording<P::Stimulus>) -> Vec<Recording<P::Stimulus>> {
         self.plant.aspects(recording)
     }

@@ -162,6 +162,11 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     fn notes(&self, _recording: &Recording<Self::Stimulus>) -> Vec<String> {
         Vec::new()
     }
+    /// What `recording` says against values of its own [`initial_parameters`](Self::initial_parameters), in words a summary can show; none
+    /// where they may be what they stand for.
+    fn contradicts(&self, _recording: &Recording<Self::Stimulus>, _initial: &[f64]) -> Option<String> {
+        None
+    }
     /// What a recording shows that no mechanism has in common: recordings of their own, each with channels of its own, which are
     /// diagnosed one by one. None where it shows but one thing.
     fn aspects(&self, _recording: &Recording<Self::Stimulus>) -> Vec<Recording<Self::Stimulus>> {

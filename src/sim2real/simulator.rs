@@ -41,6 +41,11 @@ pub trait Simulator: Send + Sync {
     fn covariates(&self, recording: &Recording<Self::Stimulus>) -> Vec<Covariate>;
     /// What was left out or is peculiar about `recording`, in words a report can show.
     fn notes(&self, recording: &Recording<Self::Stimulus>) -> Vec<String>;
+    /// What `recording` says against values of its own [`initial_parameters`](Self::initial_parameters), in words a summary can show; none
+    /// where they may be what they stand for.
+    fn contradicts(&self, _recording: &Recording<Self::Stimulus>, _initial: &[f64]) -> Option<String> {
+        None
+    }
     /// What a recording shows that nothing a twin could lack has in common: recordings of their own, each with channels of its own,
     /// as many of every recording. None where it shows but one thing.
     fn aspects(&self, _recording: &Recording<Self::Stimulus>) -> Vec<Recording<Self::Stimulus>> {

@@ -179,6 +179,7 @@ fn finish(whole: &mut Diagnosis, facts: &Facts, verdict: Verdict) {
 fn join_facts(facts: &mut Facts, more: Facts) {
     facts.tried.extend(more.tried);
     facts.fits.extend(more.fits);
+    facts.contradiction = facts.contradiction.take().or(more.contradiction);
     facts.dependence = match (facts.dependence.take(), more.dependence) {
         (Some(own), Some(other)) if other.strength > own.strength => Some(other),
         (own, other) => own.or(other),

@@ -64,6 +64,8 @@ pub(super) struct Findings {
     pub inexact: bool,
     /// Whether a law that was named would go on beyond what goes by its name.
     pub beyond: bool,
+    /// What the recordings say against what they are taken to have begun with, where nothing was named.
+    pub contradiction: Option<String>,
     /// Whether what was named of messages is refuted by others, though something is missing.
     pub refuted: bool,
 }
@@ -76,6 +78,13 @@ pub(super) fn refuted<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
         && !fits.iter().any(|fit| fit.improvement_ci95[0] > 0.0)
         && fits.iter().any(worse)
         && strongest(&dependences(inquiry, &selection.recalibrated)).is_some_and(|d| d.strength > DEPENDENT)
+}
+
+/// What the recordings say against what they are taken to have begun with, where nothing else was found that could be it.
+pub(super) fn contradiction<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<String> {
+    let begun = inquiry.evidence.compared.iter().zip(&selected.fit.state.values);
+    let mut said = begun.filter_map(|(part, values)| inquiry.twin.contradicts(part.recording, values));
+    said.next().filter(|_| selected.added.is_empty())
 }
 
 fn structured(findings: &Findings) -> bool {
@@ -139,7 +148,8 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
         let rows: usize = selection.selected.misfits.iter().map(|m| m.count).max().unwrap_or(0);
         // Messages have noise of their own beside the rounding of what they tell: it alone is nothing that is missing.
         let above = !selection.selected.within(ABOVE_THE_NOISE) || slowly_above(&selection.selected, SLOWLY_ABOVE);
-        return match left_over || findings.inexact || findings.sampled && above {
+        let known = left_over || findings.inexact || findings.contradiction.is_some();
+        return match known || findings.sampled && above {
             _ if rows == 0 || (rows < FEWEST_ROWS && !selection.selected.within(NEAR_THE_NOISE)) => Verdict::NotExcited,
             true => Verdict::Unexplained,
             false => unseen_there(&selection.selected, findings),
@@ -299,6 +309,7 @@ mod tests {
             sampled: true,
             inexact: false,
             beyond: false,
+            contradiction: None,
             refuted: false,
         };
         let white = leaving(1.0, 6_000.0);

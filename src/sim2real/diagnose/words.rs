@@ -18,6 +18,8 @@ pub(super) struct Facts {
     pub remainder: f64,
     /// What that depends on.
     pub dependence: Option<Dependence>,
+    /// What the recordings say against what they are taken to have begun with.
+    pub contradiction: Option<String>,
 }
 
 /// The answer, in one sentence.
@@ -124,6 +126,9 @@ pub(super) fn figure(value: f64, digits: usize) -> String {
 }
 
 fn shape(facts: &Facts) -> String {
+    if let Some(contradiction) = &facts.contradiction {
+        return format!(": {contradiction}");
+    }
     facts.dependence.as_ref().map_or_else(String::new, |d| format!("; what is left depends on the {}", d.on))
 }
 
