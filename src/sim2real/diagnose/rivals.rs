@@ -57,8 +57,8 @@ const LIKELY_BESIDE_ITS_LAW: f64 = 0.8;
 pub(super) fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, selection: Selection<T>) -> (Selection<T>, Vec<Place>) {
     let (mut selection, mut places) = swapped(inquiry, selection);
     while let Some(place) = anybodys(inquiry, &selection, &places) {
-        selection = selection.dropped(inquiry, place);
-        places = rivals(inquiry, &selection);
+        // What was second beside another may be worse than its rivals alone.
+        (selection, places) = swapped(inquiry, selection.dropped(inquiry, place));
     }
     (selection, places)
 }
