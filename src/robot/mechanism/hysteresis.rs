@@ -2,7 +2,6 @@
 
 use super::coulomb_friction::PRESLIDING;
 use super::drawn::{Drawn, moved, sharp, soft};
-use super::slipping::Slipping;
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
@@ -10,14 +9,10 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// comes back, and yielding at a level of `torque` after about `yield_angle`; `n = 1` in the form `soft`, `n = 2`, with a sharper
 /// knee, in the form `sharp`, where the angle is `sharp_yield_angle`. In the form `bouc_wen` `n` (`exponent`) and `sigma` are
 /// parameters too, and the angle is `elastic_angle`: with `sigma` above 1/2 it comes back more stiffly than it yielded, and with
-/// `n` below 1 it begins to yield at once, as what consists of many parts does, the weakest of which slip first. In the form
-/// `maxwell_slip` there are such parts: eight of equal torque, each elastic until it slips, at `slip_angle ((k - 1/2) / 8)^spread`; with
-/// a `spread` of 0 all slip at once, with one of 2 and more the first hardly give before they do.
+/// `n` below 1 it begins to yield at once, as what consists of many parts does, the weakest of which slip first.
 ///
 /// Source: Bouc (1967) and Wen, "Method for random vibration of hysteretic systems", ASCE Journal of the Engineering Mechanics
-/// Division 102 (1976), normalized as by Ikhouane & Rodellar, *Systems with Hysteresis* (2007), section 2;
-/// parts: Iwan, "A distributed-element model for hysteresis and its steady-state dynamic response", ASME Journal of Applied Mechanics 33
-/// (1966); Lampaert, Al-Bender & Swevers, "A generalized Maxwell-slip friction model appropriate for control purposes", PhysCon 2003.
+/// Division 102 (1976), normalized as by Ikhouane & Rodellar, *Systems with Hysteresis* (2007), section 2.
 #[derive(Debug, Clone, Copy)]
 pub struct Hysteresis;
 
@@ -49,7 +44,6 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
             Form { name: "soft", parameters: parameters("yield_angle") },
             Form { name: "sharp", parameters: parameters("sharp_yield_angle") },
             Form { name: "bouc_wen", parameters: parameters("elastic_angle").into_iter().chain(shape()).collect() },
-            Form { name: "maxwell_slip", parameters: parameters("slip_angle").into_iter().chain([spread()]).collect() },
         ]
     }
 
@@ -66,13 +60,10 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
     }
 
     fn general(&self, form: usize) -> bool {
-        form >= 2
+        form == 2
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        if form == 3 {
-            return Box::new(Slipping::of(thetas));
-        }
         let loops = Loops { torque: thetas.row(0).to_vec(), drawn: Drawn::new(thetas.row(1)) };
         match form {
             0 => Box::new(Soft(loops)),
@@ -89,11 +80,6 @@ fn shape() -> [Parameter; 2] {
         Parameter::new("exponent", "", 1.0).within(0.2, 5.0).starting_at(&[1.5]),
         Parameter::new("sigma", "", 0.5).within(0.5, 3.0).starting_at(&[1.0]).from_source(bound),
     ]
-}
-
-/// How unevenly parts slip.
-fn spread() -> Parameter {
-    Parameter::new("spread", "", 1.0).within(0.0, 6.0).starting_at(&[1.5])
 }
 
 #[derive(Clone)]

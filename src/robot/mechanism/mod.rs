@@ -14,7 +14,6 @@ mod overflow;
 mod payload_change;
 mod quadratic_drag;
 mod second_mass;
-mod slipping;
 mod spring;
 mod stiffness;
 mod stribeck_friction;
