@@ -152,6 +152,13 @@ fn bouc_wen(x: State, u: f64, torque: f64, angle: f64, [n, sigma]: [f64; 2]) -> 
     Forces { more: [rate, 0.0], ..plain(x, u, -torque * w) }
 }
 
+/// Two soft loops side by side.
+fn two_loops(x: State, u: f64, [torque, angle]: [f64; 2], [early_torque, early_yield]: [f64; 2]) -> Forces {
+    let rate = |w: f64, angle: f64| (x[1] - 0.5 * x[1].abs() * w - 0.5 * x[1] * w.abs()) / angle;
+    let more = [rate(x[2], angle), rate(x[3], early_yield)];
+    Forces { more, ..plain(x, u, -torque * x[2] - early_torque * x[3]) }
+}
+
 fn gears(x: State) -> f64 {
     -GRAVITY * x[0].sin()
 }
@@ -391,6 +398,13 @@ const CASES: &[Case] = &[
         values: &[0.3, 0.1, 0.6, 1.3],
         law: |_, x, u| bouc_wen(x, u, 0.3, 0.1, [0.6, 1.3]),
         most: 2e-5,
+    },
+    Case {
+        mechanism: "hysteresis",
+        form: "two_loops",
+        values: &[0.2, 0.2, 0.1, 0.03],
+        law: |_, x, u| two_loops(x, u, [0.2, 0.2], [0.1, 0.03]),
+        most: 5e-5,
     },
     Case {
         mechanism: "backlash",

@@ -9,10 +9,14 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// comes back, and yielding at a level of `torque` after about `yield_angle`; `n = 1` in the form `soft`, `n = 2`, with a sharper
 /// knee, in the form `sharp`, where the angle is `sharp_yield_angle`. In the form `bouc_wen` `n` (`exponent`) and `sigma` are
 /// parameters too, and the angle is `elastic_angle`: with `sigma` above 1/2 it comes back more stiffly than it yielded, and with
-/// `n` below 1 it begins to yield at once, as what consists of many parts does, the weakest of which slip first.
+/// `n` below 1 it begins to yield at once, as what consists of many parts does, the weakest of which slip first. In the form
+/// `two_loops` such a part is told apart: beside the loop of `torque` and `wide_angle` another, soft as that, yields at a level of
+/// `early_torque` after about `early_yield`.
 ///
 /// Source: Bouc (1967) and Wen, "Method for random vibration of hysteretic systems", ASCE Journal of the Engineering Mechanics
-/// Division 102 (1976), normalized as by Ikhouane & Rodellar, *Systems with Hysteresis* (2007), section 2.
+/// Division 102 (1976), normalized as by Ikhouane & Rodellar, *Systems with Hysteresis* (2007), section 2;
+/// elements in parallel: Iwan, "A distributed-element model for hysteresis and its steady-state dynamic response", ASME Journal of Applied
+/// Mechanics 33 (1966).
 #[derive(Debug, Clone, Copy)]
 pub struct Hysteresis;
 
@@ -44,6 +48,7 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
             Form { name: "soft", parameters: parameters("yield_angle") },
             Form { name: "sharp", parameters: parameters("sharp_yield_angle") },
             Form { name: "bouc_wen", parameters: parameters("elastic_angle").into_iter().chain(shape()).collect() },
+            Form { name: "two_loops", parameters: parameters("wide_angle").into_iter().chain(early(typical)).collect() },
         ]
     }
 
@@ -60,14 +65,15 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
     }
 
     fn general(&self, form: usize) -> bool {
-        form == 2
+        form >= 2
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let loops = Loops { torque: thetas.row(0).to_vec(), drawn: Drawn::new(thetas.row(1)) };
+        let loops = Loops::of(thetas, 0);
         match form {
             0 => Box::new(Soft(loops)),
             1 => Box::new(Sharp(loops)),
+            3 => Box::new(TwoLoops { wide: loops, early: Loops::of(thetas, 2) }),
             _ => Box::new(BoucWen { loops, exponent: thetas.row(2).to_vec(), sigma: thetas.row(3).to_vec() }),
         }
     }
@@ -82,16 +88,34 @@ fn shape() -> [Parameter; 2] {
     ]
 }
 
+/// What of `two_loops` yields before the rest.
+fn early(typical: &Typical) -> [Parameter; 2] {
+    let output = typical.output.max(1e-9);
+    let torque = Parameter::new("early_torque", "N m", 0.0).within(0.0, f64::INFINITY);
+    let way = Parameter::new("early_yield", "rad", 0.02 * output).within(1e-4 * output.min(1.0), f64::INFINITY);
+    [torque.starting_at(&[0.05 * typical.effort]).proportional(), way.starting_at(&[0.02 * output])]
+}
+
+/// Loops, whose torque and angle are the parameters from number `first` on.
 #[derive(Clone)]
 struct Loops {
+    first: usize,
     torque: Vec<f64>,
     drawn: Drawn,
 }
 
 impl Loops {
+    fn of(thetas: &Thetas, first: usize) -> Self {
+        Self { first, torque: thetas.row(first).to_vec(), drawn: Drawn::new(thetas.row(first + 1)) }
+    }
+
     fn change(&mut self, change: &LaneChange<'_>) {
-        change.parameter(0, &mut self.torque);
-        self.drawn.change(1, change);
+        change.parameter(self.first, &mut self.torque);
+        self.drawn.change(self.first + 1, change);
+    }
+
+    fn pull_softly<P: Mover>(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.drawn.pull(tick, scene, effects, &self.torque, |_, level, way| moved(level, way, soft));
     }
 }
 
@@ -104,8 +128,25 @@ impl<P: Mover> Law<P> for Soft {
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        let Loops { torque, drawn } = &mut self.0;
-        drawn.pull(tick, scene, effects, torque, |_, level, way| moved(level, way, soft));
+        self.0.pull_softly(tick, scene, effects);
+    }
+}
+
+#[derive(Clone)]
+struct TwoLoops {
+    wide: Loops,
+    early: Loops,
+}
+
+impl<P: Mover> Law<P> for TwoLoops {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        self.wide.change(change);
+        self.early.change(change);
+    }
+
+    fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.wide.pull_softly(tick, scene, effects);
+        self.early.pull_softly(tick, scene, effects);
     }
 }
 
@@ -118,7 +159,7 @@ impl<P: Mover> Law<P> for Sharp {
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        let Loops { torque, drawn } = &mut self.0;
+        let Loops { torque, drawn, .. } = &mut self.0;
         drawn.pull(tick, scene, effects, torque, |_, level, way| moved(level, way, sharp));
     }
 }
@@ -139,7 +180,7 @@ impl<P: Mover> Law<P> for BoucWen {
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let (exponent, sigma) = (&self.exponent, &self.sigma);
-        let Loops { torque, drawn } = &mut self.loops;
+        let Loops { torque, drawn, .. } = &mut self.loops;
         drawn.pull(tick, scene, effects, torque, |lane, level, way| bent(level, way, exponent[lane], sigma[lane]));
     }
 }
