@@ -252,3 +252,13 @@ fn what_is_refuted_where_nothing_is_off_is_not_named() {
         assert_eq!(tried(61, index).verdict, Verdict::NotExcited, "case {index}");
     }
 }
+
+/// Elements in parallel of which some yield at once: what slips before the rest was called Coulomb friction besides, at the edge of what
+/// goes by that name.
+#[test]
+fn what_yields_early_is_part_of_the_loop() {
+    for (seed, index) in [(65, 87), (51, 47)] {
+        let trial = tried(seed, index);
+        assert_eq!((names(&trial), trial.verdict), (vec!["hysteresis"], Verdict::Named), "seed {seed}, case {index}");
+    }
+}

@@ -86,3 +86,41 @@ fn what_few_orders_tell_together_is_told() {
     assert_eq!((names(&trial), trial.verdict), (vec!["half_spread"], Verdict::Named));
     assert!(names(&tried(45, 33)).contains(&"half_spread"));
 }
+
+/// The mid goes on the way of each order by what it would not have done of itself, and was taken for what the orders foresaw; those who
+/// do foresee it, half a minute ahead, bring nothing.
+#[test]
+fn who_follows_orders_is_not_foreseen() {
+    for (seed, index) in [(45, 186), (44, 195)] {
+        assert_eq!(tried(seed, index).verdict, Verdict::Unexplained, "{seed}/{index}");
+    }
+    for index in [102, 142] {
+        assert_eq!(tried(44, index).verdict, Verdict::NoMismatch, "{index}");
+    }
+}
+
+/// Two orders, or three, of hundreds tell of a delay or a cap: each is off, and what one constant says of it is what it is off by.
+#[test]
+fn two_orders_tell_of_what_hardly_ever_happens() {
+    for (index, name) in [(87, "command_delay"), (14, "command_delay"), (25, "participation_cap")] {
+        let trial = tried(45, index);
+        assert_eq!((names(&trial), trial.verdict), (vec![name], Verdict::Named), "{index}");
+    }
+    assert_eq!(names(&tried(45, 192)), ["linear_impact", "participation_cap"]);
+    assert_eq!(names(&tried(44, 92)), ["command_delay", "lot_size"]);
+}
+
+/// A cap that one order of those held out meets, and a delay of which there is no doubt and that some of them go by.
+#[test]
+fn what_few_of_those_held_out_tell_of_keeps_its_name() {
+    let trial = tried(42, 187);
+    assert_eq!((names(&trial), trial.verdict), (vec!["participation_cap"], Verdict::Named));
+    let trial = tried(44, 114);
+    assert_eq!((names(&trial), trial.verdict), (vec!["command_delay"], Verdict::Ambiguous));
+}
+
+/// Beside a transient impact the permanent one was anybody's, and was left out; alone it is far better.
+#[test]
+fn a_second_that_is_alone_again_meets_its_rivals() {
+    assert_eq!(names(&tried(45, 21)), ["permanent_impact"]);
+}

@@ -31,7 +31,9 @@ pub(super) fn summary(facts: &Facts, verdict: Verdict, effects: &[Effect]) -> St
     let names = listed(&effects.iter().map(|e| title(&e.mechanism)).collect::<Vec<_>>());
     let name = &facts.name;
     // The first channel is the one a twin is about; others speak where it gained nothing.
-    let best = facts.fits.iter().find(|f| f.improvement_ci95[0] > 0.0).or(facts.fits.first());
+    let better = |fit: &&ChannelFit| fit.trued_rmse < fit.recalibrated_rmse;
+    let best = facts.fits.iter().find(|f| f.improvement_ci95[0] > 0.0).or(facts.fits.iter().find(better));
+    let best = best.or(facts.fits.first());
     let gained = best.map_or_else(String::new, gained);
     match verdict {
         Verdict::Named => {
