@@ -402,7 +402,7 @@ const CASES: &[Case] = &[
     Case {
         mechanism: "hysteresis",
         form: "two_loops",
-        values: &[0.2, 0.2, 0.1, 0.03],
+        values: &[0.2, 0.2, 0.1, 0.15],
         law: |_, x, u| two_loops(x, u, [0.2, 0.2], [0.1, 0.03]),
         most: 5e-5,
     },

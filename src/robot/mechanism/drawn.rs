@@ -25,7 +25,12 @@ impl Drawn {
 
     /// Changes one lane, of whose parameters the angle is number `parameter`.
     pub fn change(&mut self, parameter: usize, change: &LaneChange<'_>) {
-        change.parameter(parameter, &mut self.angle);
+        self.change_by(|values| values[parameter], change);
+    }
+
+    /// Changes one lane, whose angle follows from its parameters.
+    pub fn change_by(&mut self, angle: impl FnOnce(&[f64]) -> f64, change: &LaneChange<'_>) {
+        change.derived(&mut self.angle, angle);
         change.memory(&mut self.memory);
     }
 

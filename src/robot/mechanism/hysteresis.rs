@@ -11,7 +11,7 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// parameters too, and the angle is `elastic_angle`: with `sigma` above 1/2 it comes back more stiffly than it yielded, and with
 /// `n` below 1 it begins to yield at once, as what consists of many parts does, the weakest of which slip first. In the form
 /// `two_loops` such a part is told apart: beside the loop of `torque` and `wide_angle` another, soft as that, yields at a level of
-/// `early_torque` after about `early_yield`.
+/// `early_torque` after about `early_part` of that angle.
 ///
 /// Source: Bouc (1967) and Wen, "Method for random vibration of hysteretic systems", ASCE Journal of the Engineering Mechanics
 /// Division 102 (1976), normalized as by Ikhouane & Rodellar, *Systems with Hysteresis* (2007), section 2;
@@ -69,11 +69,11 @@ impl<P: Mover> Mechanism<P> for Hysteresis {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let loops = Loops::of(thetas, 0);
+        let loops = Loops { torque: thetas.row(0).to_vec(), drawn: Drawn::new(thetas.row(1)) };
         match form {
             0 => Box::new(Soft(loops)),
             1 => Box::new(Sharp(loops)),
-            3 => Box::new(TwoLoops { wide: loops, early: Loops::of(thetas, 2) }),
+            3 => Box::new(TwoLoops::of(loops, thetas)),
             _ => Box::new(BoucWen { loops, exponent: thetas.row(2).to_vec(), sigma: thetas.row(3).to_vec() }),
         }
     }
@@ -90,28 +90,21 @@ fn shape() -> [Parameter; 2] {
 
 /// What of `two_loops` yields before the rest.
 fn early(typical: &Typical) -> [Parameter; 2] {
-    let output = typical.output.max(1e-9);
     let torque = Parameter::new("early_torque", "N m", 0.0).within(0.0, f64::INFINITY);
-    let way = Parameter::new("early_yield", "rad", 0.02 * output).within(1e-4 * output.min(1.0), f64::INFINITY);
-    [torque.starting_at(&[0.05 * typical.effort]).proportional(), way.starting_at(&[0.02 * output])]
+    let part = Parameter::new("early_part", "", 0.2).within(1e-3, 1.0);
+    [torque.starting_at(&[0.05 * typical.effort]).proportional(), part.starting_at(&[0.1])]
 }
 
-/// Loops, whose torque and angle are the parameters from number `first` on.
 #[derive(Clone)]
 struct Loops {
-    first: usize,
     torque: Vec<f64>,
     drawn: Drawn,
 }
 
 impl Loops {
-    fn of(thetas: &Thetas, first: usize) -> Self {
-        Self { first, torque: thetas.row(first).to_vec(), drawn: Drawn::new(thetas.row(first + 1)) }
-    }
-
     fn change(&mut self, change: &LaneChange<'_>) {
-        change.parameter(self.first, &mut self.torque);
-        self.drawn.change(self.first + 1, change);
+        change.parameter(0, &mut self.torque);
+        self.drawn.change(1, change);
     }
 
     fn pull_softly<P: Mover>(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
@@ -138,10 +131,19 @@ struct TwoLoops {
     early: Loops,
 }
 
+impl TwoLoops {
+    /// Beside the `wide` loops those that yield at a part of their angles.
+    fn of(wide: Loops, thetas: &Thetas) -> Self {
+        let angles: Vec<f64> = thetas.row(1).iter().zip(thetas.row(3)).map(|(wide, part)| wide * part).collect();
+        Self { wide, early: Loops { torque: thetas.row(2).to_vec(), drawn: Drawn::new(&angles) } }
+    }
+}
+
 impl<P: Mover> Law<P> for TwoLoops {
     fn change(&mut self, change: &LaneChange<'_>) {
         self.wide.change(change);
-        self.early.change(change);
+        change.parameter(2, &mut self.early.torque);
+        self.early.drawn.change_by(|values| values[1] * values[3], change);
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
@@ -159,7 +161,7 @@ impl<P: Mover> Law<P> for Sharp {
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        let Loops { torque, drawn, .. } = &mut self.0;
+        let Loops { torque, drawn } = &mut self.0;
         drawn.pull(tick, scene, effects, torque, |_, level, way| moved(level, way, sharp));
     }
 }
@@ -180,7 +182,7 @@ impl<P: Mover> Law<P> for BoucWen {
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
         let (exponent, sigma) = (&self.exponent, &self.sigma);
-        let Loops { torque, drawn, .. } = &mut self.loops;
+        let Loops { torque, drawn } = &mut self.loops;
         drawn.pull(tick, scene, effects, torque, |lane, level, way| bent(level, way, exponent[lane], sigma[lane]));
     }
 }

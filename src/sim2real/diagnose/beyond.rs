@@ -25,7 +25,7 @@ pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
     let mut opened = forms.filter_map(|(number, form)| Opened::of(inquiry, selected, place, (number, form)));
     opened.any(|opened| {
         let further = opened.followed(inquiry, selected, place);
-        lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT
+        opened.is_beyond(&further, inquiry, selected, place) && lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT
     })
 }
 
@@ -74,6 +74,21 @@ impl Opened {
         let mut values = selected.fit.values.clone();
         values.splice(own_values(inquiry, selected, place), self.start.iter().copied());
         inquiry.begun(twin, added, &values, Some(&selected.fit.state), Effort::Thorough)
+    }
+}
+
+impl Opened {
+    /// Whether what was followed from the edge ended beyond it: another form may well do better within what goes by its name.
+    fn is_beyond<T: Twin>(
+        &self,
+        further: &Hypothesis<T>,
+        inquiry: &Inquiry<'_, T>,
+        selected: &Hypothesis<T>,
+        place: usize,
+    ) -> bool {
+        let from = own_values(inquiry, selected, place).start;
+        let within = &inquiry.candidates[self.number].form.parameters;
+        within.iter().zip(&further.fit.values[from..]).any(|(p, value)| *value < p.lower || *value > p.upper)
     }
 }
 
