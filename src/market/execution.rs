@@ -6,7 +6,7 @@ use crate::sim2real::{
 };
 
 use super::foresight::{self, Foresight};
-use super::{following, Book, InFlight, OrderLog, Role, ShownDelay, Side};
+use super::{Book, InFlight, OrderLog, Role, ShownDelay, Side, following};
 
 /// What an arriving order meets.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -106,9 +106,8 @@ fn on_top(steps: &[Step]) -> [f64; 2] {
     let squares = || steps.iter().map(|step| (step.with_orders.powi(2), step.moved.powi(2)));
     let count = steps.len() as f64;
     let (x, y) = squares().fold((0.0, 0.0), |(x, y), (one, other)| (x + one / count, y + other / count));
-    let (product, square) = squares().fold((0.0, 0.0), |(product, square), (one, other)| {
-        (product + (one - x) * (other - y), square + (one - x).powi(2))
-    });
+    let (product, square) = squares()
+        .fold((0.0, 0.0), |(product, square), (one, other)| (product + (one - x) * (other - y), square + (one - x).powi(2)));
     let slope = product / square.max(f64::MIN_POSITIVE);
     let scatter = squares().map(|(one, other)| ((one - x) * (other - y - slope * (one - x))).powi(2)).sum::<f64>();
     [slope, scatter.sqrt() / square.max(f64::MIN_POSITIVE)]

@@ -25,7 +25,8 @@ pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
     let mut opened = forms.filter_map(|(number, form)| Opened::of(inquiry, selected, place, (number, form)));
     opened.any(|opened| {
         let further = opened.followed(inquiry, selected, place);
-        opened.is_beyond(&further, inquiry, selected, place) && lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT
+        opened.is_beyond(&further, inquiry, selected, place)
+            && lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT
     })
 }
 

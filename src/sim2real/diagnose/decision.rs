@@ -373,7 +373,9 @@ mod tests {
         assert!(!confirms(&with(0.0), true) && !confirms(&with(-0.1), false));
         assert!(!confirms(&error(1.0, 1.0), false), "what moves nothing there says nothing");
         let sure = |gain: f64| Effect { gain: Some(gain), ..effect(1.0, &[]) };
-        assert!(overwhelming(&[sure(400.0)]) && !overwhelming(&[sure(400.0), sure(80.0)]) && !overwhelming(&[effect(1.0, &[])]));
+        assert!(
+            overwhelming(&[sure(400.0)]) && !overwhelming(&[sure(400.0), sure(80.0)]) && !overwhelming(&[effect(1.0, &[])])
+        );
         assert!(better(&[error(0.62, 0.58), error(0.0, 0.0)]) && !better(&[error(0.62, 0.62)]));
         assert!(!better(&[error(0.62, 0.58), error(1.0, 1.1)]));
     }
