@@ -122,7 +122,7 @@ mod tests {
     /// Steps of a mid of standard deviation 1; every other is one in which an order is carried out.
     fn walk(seed: u64, order: impl Fn(&mut StdRng, f64) -> (f64, f64)) -> Vec<Step> {
         let mut rng = StdRng::seed_from_u64(seed);
-        (0..1_200)
+        (0..4_800)
             .map(|number| {
                 let of_itself: f64 = StandardNormal.sample(&mut rng);
                 let (moved, with_orders) = if number % 2 == 0 { order(&mut rng, of_itself) } else { (of_itself, 0.0) };
@@ -155,7 +155,7 @@ mod tests {
         let mut steps = walk(3, |_, of_itself| (of_itself, 0.8));
         // Orders come in the restless half alone.
         for step in &mut steps {
-            let restless = step.number < 600;
+            let restless = step.number < 2_400;
             step.moved *= if restless { 3.0 } else { 1.0 };
             step.with_orders *= if restless { 3.0 } else { 0.0 };
         }

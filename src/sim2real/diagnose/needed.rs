@@ -27,6 +27,7 @@ const MANY_ROWS: usize = 1000;
 /// or take away so much of what they are off by, all together, that no less than so many of them tell of it.
 const FEW_ROWS: usize = 4;
 const MOST: f64 = 0.75;
+const MOST_OF_FEW: f64 = 0.8;
 const RESTORED: f64 = 0.2;
 const TAKEN_AWAY: f64 = 0.9;
 /// Two are enough where all that are moved are restored, or hardly anything of what they are off by is left: that one constant should say
@@ -130,7 +131,7 @@ fn decisive<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, less: &Hyp
 
 /// Whether so many are most of all the messages there are, where these are no more than a few times as many as would tell of anything.
 fn most_of_few(moved: usize, messages: usize) -> bool {
-    messages <= INFORMATIVE_ROWS && moved >= 2 * FEW_ROWS && moved as f64 >= MOST * messages as f64
+    messages <= INFORMATIVE_ROWS && moved >= 2 * FEW_ROWS && moved as f64 >= MOST_OF_FEW * messages as f64
 }
 
 /// Whether the last of so many mechanisms explains enough of a channel that leaves so much with none, without it and with it. A channel in
