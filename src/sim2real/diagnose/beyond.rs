@@ -76,9 +76,7 @@ impl Opened {
         values.splice(own_values(inquiry, selected, place), self.start.iter().copied());
         inquiry.begun(twin, added, &values, Some(&selected.fit.state), Effort::Thorough)
     }
-}
 
-impl Opened {
     /// Whether what was followed from the edge ended beyond it: another form may well do better within what goes by its name.
     fn is_beyond<T: Twin>(
         &self,
