@@ -1,7 +1,9 @@
 //! The decision: named, ambiguous, unexplained, not excited or no mismatch.
 
+use super::Comparison;
 use super::diagnosis::{ChannelFit, Effect, Verdict};
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::needed::INFORMATIVE_ROWS;
 use super::remainder::{NEAR_THE_NOISE, dependences, strongest};
 use super::select::Selection;
 use super::structure::Dependence;
@@ -69,6 +71,8 @@ pub(super) struct Findings {
     pub beyond: bool,
     /// What the recordings say against what they are taken to have begun with, where nothing was named.
     pub contradiction: Option<String>,
+    /// Whether no more than a few of the held-out rows could tell of what was named.
+    pub few_tell: bool,
     /// Whether what was named of messages is refuted by others, though something is missing.
     pub refuted: bool,
 }
@@ -164,7 +168,9 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
         return match findings.sampled {
             true if !visible && findings.fits.iter().any(|fit| fit.improvement_ci95[1] < 0.0) => Verdict::NotExcited,
             true => unconfirmed(library(effects), clean, visible),
-            false if !findings.refuted && overwhelming(effects) && better(&findings.fits) => Verdict::Ambiguous,
+            false if !findings.refuted && findings.few_tell && overwhelming(effects) && better(&findings.fits) => {
+                Verdict::Ambiguous
+            }
             false => unconfirmed_by_messages(findings.refuted, left_over, findings.remainder),
         };
     }
@@ -182,6 +188,17 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
 fn confirms(fit: &ChannelFit, sampled: bool) -> bool {
     let least = fit.improvement_ci95[0];
     least > 0.0 || !sampled && least >= 0.0 && fit.trued_rmse < fit.recalibrated_rmse
+}
+
+/// Whether what was named moves no more than a few of the held-out rows, in any channel: where it moves many, and they do not confirm it, they
+/// say that it is not so.
+pub(super) fn few_tell(comparisons: &[Comparison]) -> bool {
+    comparisons.iter().filter(|comparison| comparison.held_out).all(|comparison| {
+        let rows = comparison.trued.iter().zip(&comparison.recalibrated).zip(&comparison.measured);
+        let moved = rows.filter(|(_, measured)| measured.is_some()).map(|((trued, recalibrated), _)| trued - recalibrated);
+        let (second, fourth) = moved.fold((0.0, 0.0), |(s, f), d| (s + d * d, f + d.powi(4)));
+        second * second < INFORMATIVE_ROWS as f64 * fourth || second == 0.0
+    })
 }
 
 /// Whether there is no doubt of anything that was named.
@@ -331,6 +348,7 @@ mod tests {
             inexact: false,
             beyond: false,
             contradiction: None,
+            few_tell: false,
             refuted: false,
         };
         let white = leaving(1.0, 6_000.0);
@@ -378,6 +396,20 @@ mod tests {
         );
         assert!(better(&[error(0.62, 0.58), error(0.0, 0.0)]) && !better(&[error(0.62, 0.62)]));
         assert!(!better(&[error(0.62, 0.58), error(1.0, 1.1)]));
+        let unseen = |moved: usize| Comparison {
+            recording: "held out".into(),
+            held_out: true,
+            clock: Clock::Event,
+            channel: "cost".into(),
+            unit: "bps".into(),
+            time: (0..600).map(f64::from).collect(),
+            measured: vec![Some(0.0); 600],
+            nominal: vec![0.0; 600],
+            recalibrated: vec![0.0; 600],
+            trued: (0..600).map(|row| if row < moved { 0.5 } else { 0.0 }).collect(),
+        };
+        assert!(few_tell(&[unseen(0)]) && few_tell(&[unseen(20), unseen(3)]));
+        assert!(!few_tell(&[unseen(3), unseen(60)]), "an impact on a tape that goes on for hours");
     }
 
     #[test]

@@ -276,6 +276,7 @@ fn followed(
         // Of what is refuted nothing was explained.
         remainder: if refuted { 1.0 } else { remainder::remainder(&inquiry, &selection, &depends) },
         refuted,
+        few_tell: decision::few_tell(&comparisons),
         contradiction: decision::contradiction(&inquiry, &selection.selected),
         followed: remainder::followed(&trued, &selection.selected),
         dependence: remainder::strongest(&depends),

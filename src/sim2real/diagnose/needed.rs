@@ -21,7 +21,7 @@ const SHARE_OF_DECISIVE: f64 = 0.0003;
 const MORE_THAN_NOISE: f64 = 0.15;
 /// A mechanism must move at least this many rows by more than the noise, or what it does be spread over as many, of so many in all, or with
 /// decisive evidence.
-const INFORMATIVE_ROWS: usize = 25;
+pub(super) const INFORMATIVE_ROWS: usize = 25;
 const MANY_ROWS: usize = 1000;
 /// ... or restore at least so many messages and most of those that it moves: they are off by no more than this part of what they were;
 /// or take away so much of what they are off by, all together, that no less than so many of them tell of it.
