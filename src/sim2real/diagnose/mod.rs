@@ -276,7 +276,8 @@ fn followed(
         // Of what is refuted nothing was explained.
         remainder: if refuted { 1.0 } else { remainder::remainder(&inquiry, &selection, &depends) },
         refuted,
-        few_tell: decision::few_tell(&comparisons),
+        // What recordings have of their own, as what orders foresaw, may be what the fitted ones tell of.
+        few_tell: decision::few_tell(&comparisons) && trued.state.values.iter().all(Vec::is_empty),
         contradiction: decision::contradiction(&inquiry, &selection.selected),
         followed: remainder::followed(&trued, &selection.selected),
         dependence: remainder::strongest(&depends),
