@@ -89,9 +89,11 @@ pub(super) fn refuted<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
 
 /// What the recordings say against what they are taken to have begun with, where nothing else was found that could be it.
 pub(super) fn contradiction<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Option<String> {
-    let begun = inquiry.evidence.compared.iter().zip(&selected.fit.state.values);
-    let mut said = begun.filter_map(|(part, values)| inquiry.twin.contradicts(part.recording, values));
-    said.next().filter(|_| selected.added.is_empty())
+    if !selected.added.is_empty() {
+        return None;
+    }
+    let mut begun = inquiry.evidence.compared.iter().zip(&selected.fit.state.values);
+    begun.find_map(|(part, values)| inquiry.twin.contradicts(part.recording, values))
 }
 
 fn structured(findings: &Findings) -> bool {

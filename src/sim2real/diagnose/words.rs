@@ -172,6 +172,35 @@ mod tests {
     }
 
     #[test]
+    fn where_chance_cannot_be_excluded_the_channel_that_falls_is_told() {
+        let fit = |channel: &str, recalibrated_rmse, trued_rmse| ChannelFit {
+            channel: channel.into(),
+            unit: String::new(),
+            recalibrated_rmse,
+            trued_rmse,
+            noise_floor: 0.1,
+            nominal_rmse: 3.0,
+            nominal_mae: 2.0,
+            recalibrated_mae: 1.0,
+            trued_mae: 0.5,
+            improvement_ci95: [0.0; 2],
+        };
+        let facts = |contradiction: Option<&str>| Facts {
+            name: "execution".into(),
+            tried: Vec::new(),
+            fits: vec![fit("cost", 0.5, 0.5), fit("filled", 0.01, 0.002)],
+            few: false,
+            remainder: 0.0,
+            dependence: None,
+            contradiction: contradiction.map(str::to_owned),
+        };
+        let named = summary(&facts(None), Verdict::Ambiguous, &[]);
+        assert!(named.contains("error of filled falls by 80 %"), "{named}");
+        let said = summary(&facts(Some("others follow")), Verdict::Unexplained, &[]);
+        assert!(said.ends_with("explains: others follow."), "{said}");
+    }
+
+    #[test]
     fn figures_have_three_digits() {
         let figures = [0.0648, 0.00425, 3.588, 59.75, 14_233.0, 0.0, 2.66e-8].map(|v| figure(v, 3));
         assert_eq!(figures, ["0.0648", "0.00425", "3.59", "59.8", "14233", "0", "2.66e-8"]);
