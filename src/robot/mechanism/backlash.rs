@@ -1,6 +1,6 @@
 //! Play in the transmission: gears that do not touch while they turn round.
 
-use super::second_mass::{Coupling, Load, SecondMass, as_one};
+use super::second_mass::{Coupling, Load, SecondMass, as_one, holds};
 use super::spring::Wall;
 use crate::robot::{Motion, Mover};
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
@@ -25,8 +25,6 @@ pub struct Backlash;
 const TOUCH: f64 = 1_000.0;
 /// A link that takes longer than this [s] to come as far as the gap is wide rests.
 const RESTS: f64 = 0.1;
-/// What pulls at a link is held up by a drive against it that is no smaller and no larger than by this factor.
-const HELD: f64 = 2.0;
 /// Damping of the touch over critical damping: gears rattle, but do not ring.
 const TOUCH_DAMPING: f64 = 1.0;
 
@@ -186,8 +184,7 @@ impl<P: Mover> Law<P> for Gap {
 /// rests for another reason has left the motor somewhere in the gap, and the middle is nearest to wherever that is.
 #[inline]
 fn leans(velocity: f64, gap: f64, [drive, external]: [f64; 2]) -> bool {
-    let held = drive * external < 0.0 && (1.0 / HELD..=HELD).contains(&(drive / external).abs());
-    held || velocity.abs() * RESTS > gap
+    holds(drive, external) || velocity.abs() * RESTS > gap
 }
 
 /// How motor and link touch in a step of `step` [s], free to move by `half` [rad] either way.

@@ -1,6 +1,6 @@
 //! A transmission that gives: a harmonic drive, a long shaft, a belt.
 
-use super::second_mass::{Coupling, Load, SecondMass, as_one};
+use super::second_mass::{Coupling, Load, SecondMass, as_one, holds};
 use super::spring::spring_inertia;
 use crate::robot::{Motion, Mover};
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
@@ -9,7 +9,8 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// critical damping of the two against each other. The motor is driven and has the joint's viscous friction, gravity pulls
 /// at the link. In the form `on_motor` the encoder is on the motor and the link has `link_share` of the inertia; in the form
 /// `on_link` the encoder is on the link and the motor has `motor_share`. In the forms that end in `_hardening` the spring gets
-/// stiffer as it twists, and is twice as stiff at `hardening_twist`: torque (1 + (twist / hardening_twist)^2).
+/// stiffer as it twists, and is twice as stiff at `hardening_twist`: torque (1 + (twist / hardening_twist)^2). At first the spring is
+/// bent as it is where both move as one, or straight where they rest and neither holds the other.
 ///
 /// Source: Spong, "Modeling and control of elastic joint robots", ASCE Journal of Dynamic Systems, Measurement, and Control
 /// 109 (1987); De Luca & Book, "Robots with flexible elements", *Springer Handbook of Robotics* (2016), section 11.1; a cubic
@@ -17,6 +18,8 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 #[derive(Debug, Clone, Copy)]
 pub struct Compliance;
 
+/// What moves by less than this part of the swing that a shaft makes when it is let go rests.
+const RESTS: f64 = 0.1;
 /// Twists below this [rad] are none.
 const LEAST_TWIST: f64 = 1e-12;
 
@@ -133,9 +136,10 @@ impl Shaft {
                     second
                 }
                 None => {
-                    // At first the shaft is bent as it is where both move as one.
-                    let (on_first, on_second) = at_rest(lane, state);
-                    let bent = twist(as_one(share, on_first, on_second) * compliance, self.hardening_twist[lane]);
+                    let efforts = at_rest(lane, state);
+                    let as_one = twist(as_one(share, efforts.0, efforts.1) * compliance, self.hardening_twist[lane]);
+                    let swing = as_one * (stiffness / reduced).sqrt();
+                    let bent = if begins_bent(first.velocity, swing, efforts) { as_one } else { 0.0 };
                     self.second[lane].insert(SecondMass::starting(Motion { position: first.position - bent, ..first }))
                 }
             };
@@ -159,6 +163,14 @@ impl Shaft {
             push.damping -= sides.damping;
         }
     }
+}
+
+/// Whether the shaft is bent at first as it is where both masses move as one, which starts them without a swing: where they move, by more
+/// than a part of what `swing` they would begin otherwise [rad/s], or where one of them rests because the other holds it. What rests
+/// for another reason has not been pulled at by its motor yet, nor has it pulled: the shaft is straight.
+#[inline]
+fn begins_bent(velocity: f64, swing: f64, (on_first, on_second): (f64, f64)) -> bool {
+    velocity.abs() > RESTS * swing.abs() || holds(on_first, on_second)
 }
 
 /// The twist of a hardening spring under what would twist it by `linear` if it did not harden, by Newton's method.

@@ -2,6 +2,9 @@
 
 use crate::robot::Motion;
 
+/// What pulls at one mass is held up by an effort on the other against it that is no smaller and no larger than by this factor.
+const HELD: f64 = 1.25;
+
 /// What holds the second mass to the coordinate during a step, linear in what their velocities change by: the effort on the
 /// second mass is `effort + rate (change of the coordinate's velocity - change of its own)`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -80,6 +83,12 @@ impl SecondMass {
 /// 1, that of the second is `share`, `on_first` and `on_second` act on them [N m].
 pub(super) fn as_one(share: f64, on_first: f64, on_second: f64) -> f64 {
     share * on_first - (1.0 - share) * on_second
+}
+
+/// Whether one of two efforts [N m] holds the other up, so that what they act on rests by itself.
+#[inline]
+pub(super) fn holds(one: f64, other: f64) -> bool {
+    one * other < 0.0 && (1.0 / HELD..=HELD).contains(&(one / other).abs())
 }
 
 #[cfg(test)]
