@@ -286,6 +286,23 @@ mod tests {
         }
     }
 
+    /// A link that is let go falls with its own inertia alone until the shaft has bent; one that its motor holds up stays.
+    #[test]
+    fn what_is_let_go_begins_with_a_straight_shaft() {
+        let (weight, inertia, share) = (2.0, 0.1, 0.4);
+        let at = |drive: f64, velocity: f64| {
+            let trial = Trial { parameters: [inertia, 0.0, weight, 1.0], position: 0.9, velocity, step: 1e-4 };
+            let motion = trial.follow(&Compliance, 1, &[0.05, share, 0.0], &[drive; 20]);
+            (motion[19].velocity - velocity) / (19.0 * 1e-4)
+        };
+        let pull = weight * 0.9_f64.sin();
+        let alone = -pull / ((1.0 - share) * inertia);
+        assert!((at(0.0, 0.0) / alone - 1.0).abs() < 0.02, "{}", at(0.0, 0.0));
+        assert!(at(pull, 0.0).abs() < 1e-6 * alone.abs(), "{}", at(pull, 0.0));
+        // What moves has been pulled at before: both move as one.
+        assert!((at(0.0, 9.0) / (-pull / inertia) - 1.0).abs() < 0.05, "{}", at(0.0, 9.0));
+    }
+
     #[test]
     fn what_creeps_is_not_sought_as_elastic() {
         let sought = Mechanism::<Joint>::sought(&Compliance, &Typical::default());

@@ -109,6 +109,12 @@ mod tests {
     }
 
     #[test]
+    fn what_holds_up_pulls_the_other_way_with_about_as_much() {
+        assert!(holds(1.0, -1.0) && holds(-0.9, 1.0) && holds(1.2, -1.0));
+        assert!(![(1.0, 1.0), (1.5, -1.0), (0.5, -1.0), (0.0, -1.0), (0.0, 0.0)].iter().any(|(a, b)| holds(*a, *b)));
+    }
+
+    #[test]
     fn dry_friction_holds_the_mass_and_the_coordinate_leans_on_it() {
         let load = Load { inertia: 0.2, effort: 0.7, damping: 0.0, dry_friction: 1.0 };
         let mut mass = SecondMass::default();

@@ -89,6 +89,17 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
         }
     }
 
+    /// The same evidence, in which hypotheses are compared on windows that start afresh, into so many of which the longest part is cut.
+    pub(super) fn in_windows(&self, count: f64) -> Self {
+        let lasts = |part: &Part<'_, S>| {
+            let time = &part.recording.time[part.rows.clone()];
+            time.last().unwrap_or(&0.0) - time.first().unwrap_or(&0.0)
+        };
+        let seconds = self.free_run.iter().map(lasts).fold(0.0, f64::max) / count;
+        let compared = self.free_run.iter().flat_map(|p| p.windows(seconds)).collect();
+        Self { compared, window: Some(seconds), ..self.in_free_run() }
+    }
+
     /// Variance of the rounding of `channel`, in units of its noise.
     pub(super) fn rounding_of(&self, channel: &str) -> f64 {
         self.weights.iter().position(|w| w.channel == channel).map_or(0.0, |k| self.rounding[k])

@@ -11,7 +11,7 @@ use super::weigh::{gain, lead, pursued, ranked, squares};
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
 use crate::sim2real::identify::Effort;
-use crate::sim2real::{About, Candidate, Twin};
+use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// A mechanism must gain more than this to be added.
 pub(super) const ACCEPT: f64 = 10.0;
@@ -44,6 +44,8 @@ const IN_ALL_FORMS: usize = 3;
 const PROMISED: f64 = 0.1;
 const KEPT: f64 = 0.5;
 const BROKEN_PROMISES: usize = 2;
+/// The same where none kept what its signature promised.
+const ALL_BROKEN: usize = 8;
 /// Signatures with a cosine above this look alike: such rivals are fitted too.
 const ALIKE: f64 = 0.9;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
@@ -305,7 +307,7 @@ fn further_forms<T: Twin>(
             best.push(added);
         }
     }
-    let broken = broken_promises(parent, jobs, brief);
+    let broken = broken_promises(inquiry, parent, jobs, brief);
     let further = |(place, one, fitted): &(usize, Screened, bool)| {
         let known = match inquiry.candidates[one.number].general {
             true => best.first().is_some_and(|first| *first == name(one.number)),
@@ -316,20 +318,26 @@ fn further_forms<T: Twin>(
     jobs.iter().map(further).collect()
 }
 
-/// The candidates beside the best parent that explain far less than their signatures promised, those that promised most first.
+/// The candidates beside the best parent that explain far less than their signatures promised, those that promised most first: more of
+/// them where none has kept its promise, for then it is the fits that went astray. Fits to messages, which do not add up, do not.
 fn broken_promises<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
     parent: &Hypothesis<T>,
     jobs: &[(usize, Screened, bool)],
     brief: &[Option<Hypothesis<T>>],
 ) -> Vec<usize> {
     let own = jobs.iter().zip(brief).filter(|((place, _, _), _)| *place == 0);
-    let broken = own.filter_map(|((_, one, _), child)| {
+    let promises = own.filter_map(|((_, one, _), child)| {
         let (promised, kept) = (one.score.max(0.0).powi(2), 1.0 - squares(child.as_ref()?) / squares(parent));
-        (promised > PROMISED && kept < KEPT * promised).then_some((promised, one.number))
+        (promised > PROMISED).then_some((promised, kept, one.number))
     });
-    let mut broken: Vec<(f64, usize)> = broken.collect();
-    broken.sort_by(|a, b| b.0.total_cmp(&a.0));
-    broken.into_iter().take(BROKEN_PROMISES).map(|(_, number)| number).collect()
+    let mut promises: Vec<(f64, f64, usize)> = promises.collect();
+    promises.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let most = promises.iter().map(|(_, kept, _)| *kept).fold(0.0, f64::max);
+    let sampled = inquiry.twin.clock() != Clock::Event;
+    let astray = sampled && promises.first().is_some_and(|(promised, _, _)| most < KEPT * promised);
+    let broken = promises.into_iter().filter(|(promised, kept, _)| *kept < KEPT * promised);
+    broken.take(if astray { ALL_BROKEN } else { BROKEN_PROMISES }).map(|(_, _, number)| number).collect()
 }
 
 /// Fits to their end those of the briefly fitted hypotheses that may yet be the best.
