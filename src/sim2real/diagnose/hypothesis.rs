@@ -88,7 +88,7 @@ impl<T: Twin> Inquiry<'_, T> {
     /// The twin as given, its own parameters refitted.
     pub fn recalibrated(&self) -> Hypothesis<T> {
         let start: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
-        let directly = self.fitted(self.twin.clone(), Vec::new(), &[start.clone()], None, Effort::Thorough);
+        let directly = self.fitted(self.twin.clone(), Vec::new(), std::slice::from_ref(&start), None, Effort::Thorough);
         if self.twin.clock() == Clock::Event || self.evidence.window.is_some() || directly.within(FOLLOWED) {
             return directly;
         }
