@@ -108,6 +108,10 @@ impl<T: Twin> Simulator for Kind<T> {
         self.0.scatter(self.own(recording), channel)
     }
 
+    fn in_closed_loop(&self) -> bool {
+        self.0.in_closed_loop()
+    }
+
     fn covariates(&self, recording: &Recording<AnyStimulus>) -> Vec<Covariate> {
         self.0.covariates(self.own(recording))
     }
@@ -231,6 +235,10 @@ impl Simulator for AnyTwin {
 
     fn scatter(&self, recording: &Recording<AnyStimulus>, channel: &str) -> f64 {
         self.0.scatter(recording, channel)
+    }
+
+    fn in_closed_loop(&self) -> bool {
+        self.0.in_closed_loop()
     }
 
     fn covariates(&self, recording: &Recording<AnyStimulus>) -> Vec<Covariate> {

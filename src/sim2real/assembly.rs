@@ -208,6 +208,10 @@ impl<P: Plant> Simulator for Assembly<P> {
         self.plant.scatter(recording, channel)
     }
 
+    fn in_closed_loop(&self) -> bool {
+        self.controller.is_some()
+    }
+
     fn covariates(&self, recording: &Recording<P::Stimulus>) -> Vec<Covariate> {
         self.plant.covariates(recording)
     }

@@ -33,6 +33,10 @@ pub trait Simulator: Send + Sync {
     fn scatter(&self, _recording: &Recording<Self::Stimulus>, _channel: &str) -> f64 {
         0.0
     }
+    /// Whether commands are set points that a controller holds, which remembers what was before.
+    fn in_closed_loop(&self) -> bool {
+        false
+    }
     /// How many commands a recording of messages holds; of samples of a signal it is as many as there are rows.
     fn sent(&self, recording: &Recording<Self::Stimulus>) -> usize {
         recording.time.len()

@@ -89,7 +89,9 @@ impl<T: Twin> Inquiry<'_, T> {
     pub fn recalibrated(&self) -> Hypothesis<T> {
         let start: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
         let directly = self.fitted(self.twin.clone(), Vec::new(), std::slice::from_ref(&start), None, Effort::Thorough);
-        if self.twin.clock() == Clock::Event || self.evidence.window.is_some() || directly.within(FOLLOWED) {
+        // What starts in the middle of a closed loop lacks what its controller remembers.
+        let starts_anywhere = self.twin.clock() != Clock::Event && !self.twin.in_closed_loop();
+        if !starts_anywhere || self.evidence.window.is_some() || directly.within(FOLLOWED) {
             return directly;
         }
         // What a free run is off by early decides where it is late; windows that start afresh lead to where it follows.
