@@ -137,9 +137,9 @@ impl Shaft {
                 }
                 None => {
                     let efforts = at_rest(lane, state);
-                    let as_one = twist(as_one(share, efforts.0, efforts.1) * compliance, self.hardening_twist[lane]);
-                    let swing = as_one * (stiffness / reduced).sqrt();
-                    let bent = if begins_bent(first.velocity, swing, efforts) { as_one } else { 0.0 };
+                    let together = twist(as_one(share, efforts.0, efforts.1) * compliance, self.hardening_twist[lane]);
+                    let swing = together * (stiffness / reduced).sqrt();
+                    let bent = if begins_bent(first.velocity, swing, efforts) { together } else { 0.0 };
                     self.second[lane].insert(SecondMass::starting(Motion { position: first.position - bent, ..first }))
                 }
             };

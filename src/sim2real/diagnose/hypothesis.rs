@@ -75,8 +75,8 @@ pub(super) struct Inquiry<'a, T: Twin> {
     pub seed: Seed,
 }
 
-/// A twin that leaves at most this many times the mean square of the noise follows its recordings.
-const FOLLOWED: f64 = 4.0;
+/// A twin that leaves at most this many times the mean square of the noise keeps up with its recordings.
+const KEEPS_UP: f64 = 4.0;
 /// Into so many windows recordings are cut, one after the other, to bring a twin near one that it does not follow (multiple shooting:
 /// Bock, "Recent advances in parameter identification techniques for ODE", in *Numerical Treatment of Inverse Problems* (1983)).
 const WINDOWS: [f64; 2] = [24.0, 6.0];
@@ -85,23 +85,27 @@ const WINDOWS: [f64; 2] = [24.0, 6.0];
 const STARTS: usize = 4;
 
 impl<T: Twin> Inquiry<'_, T> {
-    /// The twin as given, its own parameters refitted.
+    /// The twin as given, its own parameters refitted: from where they are given and, where that does not follow, from where windows lead.
     pub fn recalibrated(&self) -> Hypothesis<T> {
-        let start: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
-        let directly = self.fitted(self.twin.clone(), Vec::new(), std::slice::from_ref(&start), None, Effort::Thorough);
+        let given: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
+        let directly = self.begun(self.twin.clone(), Vec::new(), &given, None, Effort::Thorough);
         // What starts in the middle of a closed loop lacks what its controller remembers.
         let starts_anywhere = self.twin.clock() != Clock::Event && !self.twin.in_closed_loop();
-        if !starts_anywhere || self.evidence.window.is_some() || directly.within(FOLLOWED) {
+        if !starts_anywhere || self.evidence.window.is_some() || directly.within(KEEPS_UP) {
             return directly;
         }
-        // What a free run is off by early decides where it is late; windows that start afresh lead to where it follows.
-        let near = WINDOWS.iter().fold(start, |values, count| {
+        let approached = self.begun(self.twin.clone(), Vec::new(), &self.approached(given), None, Effort::Thorough);
+        if squares(&approached) < squares(&directly) { approached } else { directly }
+    }
+
+    /// The twin's own parameters, from `given` on, where they fit windows that start afresh: what a free run is off by early decides where
+    /// it is late.
+    fn approached(&self, given: Vec<f64>) -> Vec<f64> {
+        WINDOWS.iter().fold(given, |values, count| {
             let evidence = self.evidence.in_windows(*count);
             let there = Inquiry { evidence: &evidence, ..*self };
-            there.fitted(self.twin.clone(), Vec::new(), &[values], None, Effort::Thorough).fit.values
-        });
-        let approached = self.fitted(self.twin.clone(), Vec::new(), &[near], None, Effort::Thorough);
-        if squares(&approached) < squares(&directly) { approached } else { directly }
+            there.begun(self.twin.clone(), Vec::new(), &values, None, Effort::Thorough).fit.values
+        })
     }
 
     /// `parent` with candidate `number` added, fitted from the starts that screening liked best.

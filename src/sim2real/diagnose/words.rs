@@ -146,11 +146,10 @@ fn listed(names: &[String]) -> String {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_run_that_leaves_all_bounds_has_no_error() {
-        let fit = |recalibrated_rmse, trued_rmse| ChannelFit {
-            channel: "position".into(),
-            unit: "rad".into(),
+    fn fit(channel: &str, unit: &str, [recalibrated_rmse, trued_rmse]: [f64; 2]) -> ChannelFit {
+        ChannelFit {
+            channel: channel.into(),
+            unit: unit.into(),
             recalibrated_rmse,
             trued_rmse,
             noise_floor: 0.1,
@@ -159,8 +158,12 @@ mod tests {
             recalibrated_mae: 1.0,
             trued_mae: 0.5,
             improvement_ci95: [0.0; 2],
-        };
-        let said = |before, after| gained(&fit(before, after));
+        }
+    }
+
+    #[test]
+    fn a_run_that_leaves_all_bounds_has_no_error() {
+        let said = |before, after| gained(&fit("position", "rad", [before, after]));
         assert_eq!(
             said(2.0, 1.0),
             "the held-out error of position falls by 50 %, from 2.00 to 1.00 rad (noise floor 0.100)"
@@ -173,22 +176,10 @@ mod tests {
 
     #[test]
     fn where_chance_cannot_be_excluded_the_channel_that_falls_is_told() {
-        let fit = |channel: &str, recalibrated_rmse, trued_rmse| ChannelFit {
-            channel: channel.into(),
-            unit: String::new(),
-            recalibrated_rmse,
-            trued_rmse,
-            noise_floor: 0.1,
-            nominal_rmse: 3.0,
-            nominal_mae: 2.0,
-            recalibrated_mae: 1.0,
-            trued_mae: 0.5,
-            improvement_ci95: [0.0; 2],
-        };
         let facts = |contradiction: Option<&str>| Facts {
             name: "execution".into(),
             tried: Vec::new(),
-            fits: vec![fit("cost", 0.5, 0.5), fit("filled", 0.01, 0.002)],
+            fits: vec![fit("cost", "", [0.5, 0.5]), fit("filled", "", [0.01, 0.002])],
             few: false,
             remainder: 0.0,
             dependence: None,
