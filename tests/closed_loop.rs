@@ -91,6 +91,13 @@ fn a_controlled_arm_moves_as_one_integrated_by_itself() {
     }
 }
 
+/// Windows may start an open loop anywhere, and no closed one.
+#[test]
+fn a_loop_says_whether_it_is_closed() {
+    let open = Assembly::new(arm(), MECHANISMS);
+    assert!(!open.in_closed_loop() && open.controlled_by(pid(None, DerivativeOf::Error)).in_closed_loop());
+}
+
 #[test]
 fn lanes_of_a_closed_loop_do_not_see_each_other() {
     let goals = set_points(400);
