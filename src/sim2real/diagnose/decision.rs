@@ -4,20 +4,16 @@ use super::Comparison;
 use super::diagnosis::{ChannelFit, Effect, Verdict};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::needed::INFORMATIVE_ROWS;
-use super::remainder::{NEAR_THE_NOISE, dependences, strongest};
+use super::remainder::{MOSTLY_LEFT, NEAR_THE_NOISE, dependences, strongest};
 use super::select::Selection;
-use super::structure::Dependence;
+use super::structure::{DEPENDENT, Dependence};
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Twin};
 
 /// A remainder above this part of the first misfit is more than an error of form.
 const FORM_ERROR: f64 = 0.10;
-/// Close to the noise a remainder on held-out data is known less well: above this part it is more than an error of form.
-const MOSTLY_LEFT: f64 = 0.35;
 /// The mean square of the noise is known to this factor.
 const NOISE_KNOWN: f64 = 1.05;
-/// A residual counts as structured where a covariate's F test is this strong (-log10 p): complete models reach 5.
-pub(super) const DEPENDENT: f64 = 6.5;
 /// A residual counts as structured where a regression foretells this part of it on held-out data.
 pub(super) const FORETOLD: f64 = 0.10;
 /// Where this part of it is foretold, what is left is physics, however small it is beside what was found.

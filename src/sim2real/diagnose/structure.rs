@@ -16,6 +16,9 @@ const WINSOR: f64 = 0.95;
 /// A residual of this part of the largest is nothing.
 const NOTHING: f64 = 1e-3;
 
+/// A residual counts as structured where a covariate's F test is this strong (-log10 p): complete models reach 5.
+pub(super) const DEPENDENT: f64 = 6.5;
+
 /// A covariate that the mean residual depends on.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Dependence {
