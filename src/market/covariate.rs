@@ -5,6 +5,9 @@ use crate::sim2real::{Recording, Timestamp};
 use super::volatility_regime::restless;
 use super::{Book, InFlight, OrderLog, Seen, Side, Tape};
 
+/// The name of the column that tells purchases, 1, from sales, -1.
+pub(super) const SIDE: &str = "side";
+
 /// Values by name, one a row; what nothing is known of has no column, and an order of which a value is not known, and a look at the
 /// market, have the median of the others, which speaks for no dependence.
 ///
@@ -28,7 +31,7 @@ pub(super) fn covariates(recording: &Recording<OrderLog>) -> Vec<(&'static str, 
         ("quoted spread", by_book(&|_, book| Some(2.0 * book.half_spread()).filter(|_| book.mid().is_some()))),
         ("imbalance of the touch", by_book(&imbalance)),
         ("quantity", by_order(&|order| Some(order.quantity))),
-        ("side", by_order(&|order| Some(order.side.sign()))),
+        (SIDE, by_order(&|order| Some(order.side.sign()))),
         ("volatility before", by_order(&|order| volatility(log.tape(), order.decided_at))),
         ("probability of the restless regime", restless),
         ("own flow over 60 s before", own_flow(log.orders(), 60.0).into_iter().map(Some).collect()),

@@ -279,6 +279,11 @@ impl Plant for Execution {
         super::covariate::covariates(recording)
     }
 
+    /// Laws act against an order, and the same on purchases and on sales.
+    fn no_law_knows(&self, covariate: &str) -> bool {
+        covariate == super::covariate::SIDE
+    }
+
     fn notes(&self, recording: &Recording<OrderLog>) -> Vec<String> {
         recording.stimulus.notes().to_vec()
     }

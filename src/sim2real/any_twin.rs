@@ -120,6 +120,10 @@ impl<T: Twin> Simulator for Kind<T> {
         self.0.notes(self.own(recording))
     }
 
+    fn no_law_knows(&self, covariate: &str) -> bool {
+        self.0.no_law_knows(covariate)
+    }
+
     fn contradicts(&self, recording: &Recording<AnyStimulus>, initial: &[f64]) -> Option<String> {
         self.0.contradicts(self.own(recording), initial)
     }
@@ -247,6 +251,10 @@ impl Simulator for AnyTwin {
 
     fn notes(&self, recording: &Recording<AnyStimulus>) -> Vec<String> {
         self.0.notes(recording)
+    }
+
+    fn no_law_knows(&self, covariate: &str) -> bool {
+        self.0.no_law_knows(covariate)
     }
 
     fn contradicts(&self, recording: &Recording<AnyStimulus>, initial: &[f64]) -> Option<String> {

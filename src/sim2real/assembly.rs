@@ -216,6 +216,10 @@ impl<P: Plant> Simulator for Assembly<P> {
         self.plant.covariates(recording)
     }
 
+    fn no_law_knows(&self, covariate: &str) -> bool {
+        self.plant.no_law_knows(covariate)
+    }
+
     fn contradicts(&self, recording: &Recording<P::Stimulus>, initial: &[f64]) -> Option<String> {
         self.plant.contradicts(recording, initial)
     }

@@ -158,6 +158,10 @@ pub trait Plant: Send + Sync + Sized + Clone + 'static {
     fn covariates(&self, _recording: &Recording<Self::Stimulus>) -> Vec<Covariate> {
         Vec::new()
     }
+    /// Whether no law of any registry depends on that covariate: what depends on it is none of them.
+    fn no_law_knows(&self, _covariate: &str) -> bool {
+        false
+    }
     /// What was left out or is peculiar about `recording`, in words a report can show.
     fn notes(&self, _recording: &Recording<Self::Stimulus>) -> Vec<String> {
         Vec::new()

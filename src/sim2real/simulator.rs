@@ -43,6 +43,10 @@ pub trait Simulator: Send + Sync {
     }
     /// What a residual may depend on when something is missing, row by row: the remainder is tested against each.
     fn covariates(&self, recording: &Recording<Self::Stimulus>) -> Vec<Covariate>;
+    /// Whether no law of any registry depends on that covariate: what depends on it is none of them.
+    fn no_law_knows(&self, _covariate: &str) -> bool {
+        false
+    }
     /// What was left out or is peculiar about `recording`, in words a report can show.
     fn notes(&self, recording: &Recording<Self::Stimulus>) -> Vec<String>;
     /// What `recording` says against values of its own [`initial_parameters`](Self::initial_parameters), in words a summary can show; none

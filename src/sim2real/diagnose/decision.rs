@@ -3,6 +3,7 @@
 use super::Comparison;
 use super::diagnosis::{ChannelFit, Effect, Verdict};
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::locate::Covariates;
 use super::needed::INFORMATIVE_ROWS;
 use super::remainder::{MOSTLY_LEFT, NEAR_THE_NOISE, dependences, strongest};
 use super::select::Selection;
@@ -71,16 +72,23 @@ pub(super) struct Findings {
     pub few_tell: bool,
     /// Whether what was named of messages is refuted by others, though something is missing.
     pub refuted: bool,
+    /// Whether something that no law knows explains more of messages than what was named.
+    pub of_no_law: bool,
 }
 
 /// Whether what was named of messages does worse than nothing on those held out, while without it they depend on something: what was
 /// fitted is not what is missing.
-pub(super) fn refuted<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, fits: &[ChannelFit]) -> bool {
+pub(super) fn refuted<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    selection: &Selection<T>,
+    fits: &[ChannelFit],
+    covariates: &Covariates,
+) -> bool {
     let messages = inquiry.twin.clock() == Clock::Event && !selection.selected.added.is_empty();
     messages
         && !fits.iter().any(|fit| fit.improvement_ci95[0] > 0.0)
         && fits.iter().any(worse)
-        && strongest(&dependences(inquiry, &selection.recalibrated)).is_some_and(|d| d.strength > DEPENDENT)
+        && strongest(&dependences(inquiry, &selection.recalibrated, covariates)).is_some_and(|d| d.strength > DEPENDENT)
 }
 
 /// What the recordings say against what they are taken to have begun with, where nothing else was found that could be it.
@@ -159,6 +167,9 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
             true => Verdict::Unexplained,
             false => unseen_there(&selection.selected, findings),
         };
+    }
+    if findings.of_no_law {
+        return Verdict::Unexplained;
     }
     if !findings.fits.iter().any(|fit| confirms(fit, findings.sampled)) {
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE);
@@ -348,6 +359,7 @@ mod tests {
             contradiction: None,
             few_tell: false,
             refuted: false,
+            of_no_law: false,
         };
         let white = leaving(1.0, 6_000.0);
         assert_eq!(unseen_there(&white, &findings(1.2)), Verdict::NoMismatch);

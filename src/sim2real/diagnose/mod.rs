@@ -32,6 +32,7 @@ mod gates;
 mod hypothesis;
 mod locate;
 mod needed;
+mod no_law;
 mod noise;
 mod onset;
 mod profile;
@@ -267,15 +268,19 @@ fn followed(
     };
     let comparisons = prove::compared(&contest, inquiry.evidence, seed);
     let known = shown(&trued, selection.selected.twin.parameters());
-    let depends = remainder::dependences(&inquiry, &selection.selected);
+    let covariates = locate::covariates(&inquiry);
+    let of_no_law = no_law::explains_more(&inquiry, &selection, &covariates);
+    let left_by = if of_no_law { &selection.recalibrated } else { &selection.selected };
+    let depends = remainder::dependences(&inquiry, left_by, &covariates);
     let fits = prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed);
-    let refuted = decision::refuted(&inquiry, &selection, &fits);
+    let refuted = decision::refuted(&inquiry, &selection, &fits, &covariates);
     let findings = decision::Findings {
         fits,
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
         // Of what is refuted nothing was explained.
-        remainder: if refuted { 1.0 } else { remainder::remainder(&inquiry, &selection, &depends) },
+        remainder: if refuted || of_no_law { 1.0 } else { remainder::remainder(&inquiry, &selection, &depends) },
         refuted,
+        of_no_law,
         // What recordings have of their own, as what orders foresaw, may be what the fitted ones tell of.
         few_tell: decision::few_tell(&comparisons) && trued.state.values.iter().all(Vec::is_empty),
         contradiction: decision::contradiction(&inquiry, &selection.selected),
@@ -294,7 +299,6 @@ fn followed(
     let seen: Vec<&Candidate> = found.of.iter().filter(|c| !named.contains(&c.about.name)).collect();
     verdict::recognized(&mut diagnosis, &inquiry, found, &seen);
     progress("saying where", 0, 1);
-    let covariates = locate::covariates(&inquiry);
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
     diagnosis.location.recordings = by_recording::by_recording(&comparisons);
     let activities = activity::activities(&inquiry, &selection.selected, &trued, &covariates);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::locate::{Covariates, identity};
 use super::select::Selection;
 use super::structure::{DEPENDENT, Dependence, Left, foretold as regression, strongest_dependence};
 use super::whiteness::{self, ChannelMisfit};
@@ -79,7 +80,11 @@ pub(super) struct OfChannel {
 
 /// What the remaining residuals of messages depend on most, channel by channel, of those that leave more than what numbers are rounded
 /// to: below it there is nothing to explain, however regular it is, for rounding is regular too.
-pub(super) fn dependences<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>) -> Vec<OfChannel> {
+pub(super) fn dependences<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    selected: &Hypothesis<T>,
+    covariates: &Covariates,
+) -> Vec<OfChannel> {
     let rounded = |channel: &str| {
         let misfit = selected.misfits.iter().find(|misfit| misfit.channel == channel);
         misfit.is_none_or(|misfit| misfit.within(NEAR_THE_NOISE, inquiry.evidence.rounding_of(channel)))
@@ -89,11 +94,10 @@ pub(super) fn dependences<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothes
     }
     let parts = &inquiry.evidence.compared;
     let residual = selected.fit.residual.as_slice();
-    // Looking them up takes as long as a fit where a tape is long.
-    let covariates: Vec<Vec<Covariate>> = parts.iter().map(|part| inquiry.twin.covariates(part.recording)).collect();
     let blocks = inquiry.problem(&selected.twin, parts).blocks().into_iter().filter(|block| !rounded(&block.channel));
+    let of_part = |part: usize| covariates.get(&identity(parts[part].recording));
     let of = |block: Block| {
-        let dependence = strongest_dependence(&residual[block.range.clone()], &block.rows, &covariates[block.part])?;
+        let dependence = strongest_dependence(&residual[block.range.clone()], &block.rows, of_part(block.part)?)?;
         Some(OfChannel { channel: block.channel, dependence })
     };
     blocks.filter_map(of).collect()
@@ -170,9 +174,4 @@ fn follow<T: Twin>(
             }
         }
     }
-}
-
-/// What tells a recording from others: two may well have the same name.
-fn identity<S>(recording: &Recording<S>) -> usize {
-    std::ptr::from_ref(recording) as usize
 }

@@ -47,36 +47,33 @@ pub(super) fn strongest_dependence(residual: &[f64], rows: &[usize], covariates:
 }
 
 fn winsorize(residual: &[f64]) -> Vec<f64> {
+    let limit = told_at_most(residual);
+    residual.iter().map(|r| r.max(-limit).min(limit)).collect()
+}
+
+/// The size that winsorized residuals have at most.
+pub(super) fn told_at_most(residual: &[f64]) -> f64 {
     let largest = residual.iter().fold(0.0_f64, |most, r| most.max(r.abs()));
     // Where most are nothing at all, as of orders that are filled but for a few, these few are what there is to say.
     let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).filter(|size| *size > NOTHING * largest).collect();
     sizes.sort_by(f64::total_cmp);
-    let limit =
-        sizes.get(((sizes.len() as f64 * WINSOR) as usize).min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0);
-    residual.iter().map(|r| r.max(-limit).min(limit)).collect()
+    sizes.get(((sizes.len() as f64 * WINSOR) as usize).min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
 /// -log10 of the p-value that the mean of `values` is the same in all quantile groups of `by`, and the sum of squares that the groups
 /// explain beyond chance. Values within groups that have something in common with those before them, as noise that remembers itself
 /// has, count as so many fewer.
 fn analysis_of_variance(values: &[f64], by: &[f64]) -> Option<(f64, f64)> {
-    let mut order: Vec<usize> = (0..by.len()).filter(|i| by[*i].is_finite()).collect();
-    order.sort_by(|a, b| by[*a].total_cmp(&by[*b]));
+    let order = in_order(by);
     let groups = cut(&order, by);
     let count: usize = groups.iter().map(|g| g.len()).sum();
     if groups.len() < 2 || count < groups.len() + 10 {
         return None;
     }
-    let mean = |rows: &[usize]| rows.iter().map(|i| values[*i]).sum::<f64>() / rows.len() as f64;
+    let mean = |rows: &[usize]| mean(values, rows);
     let all = mean(&order);
     let between: f64 = groups.iter().map(|g| g.len() as f64 * (mean(g) - all).powi(2)).sum();
-    let mut left: Vec<(usize, f64)> = groups
-        .iter()
-        .flat_map(|group| {
-            let own = mean(group);
-            group.iter().map(move |i| (*i, values[*i] - own))
-        })
-        .collect();
+    let mut left = about_means(values, &groups);
     let within: f64 = left.iter().map(|(_, left)| left * left).sum();
     let (df1, df2) = ((groups.len() - 1) as f64, (count - groups.len()) as f64);
     let explained = (between - df1 * within / df2).max(0.0);
@@ -90,6 +87,34 @@ fn analysis_of_variance(values: &[f64], by: &[f64]) -> Option<(f64, f64)> {
     let f = FisherSnedecor::new(df1, df2).ok()?;
     let p = f.sf(between / df1 / (within / df2) / remembered).max(1e-300);
     Some((-p.log10(), explained))
+}
+
+/// The number of quantile groups of `by`, two or more, and `values` about their means in these.
+pub(super) fn about_groups(values: &[f64], by: &[f64]) -> Option<(usize, Vec<f64>)> {
+    let order = in_order(by);
+    let groups = cut(&order, by);
+    let left = || about_means(values, &groups).into_iter().map(|(_, left)| left).collect();
+    (groups.len() > 1).then(|| (groups.len(), left()))
+}
+
+/// The rows of what is known, by its size.
+fn in_order(by: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..by.len()).filter(|i| by[*i].is_finite()).collect();
+    order.sort_by(|a, b| by[*a].total_cmp(&by[*b]));
+    order
+}
+
+fn mean(values: &[f64], rows: &[usize]) -> f64 {
+    rows.iter().map(|i| values[*i]).sum::<f64>() / rows.len() as f64
+}
+
+/// Rows, and by how much their values differ from the mean of their group.
+fn about_means(values: &[f64], groups: &[&[usize]]) -> Vec<(usize, f64)> {
+    let of_group = |group: &&[usize]| {
+        let own = mean(values, group);
+        group.iter().map(move |i| (*i, values[*i] - own)).collect::<Vec<_>>()
+    };
+    groups.iter().flat_map(of_group).collect()
 }
 
 /// Quantile groups of the sorted rows; equal values stay together.
