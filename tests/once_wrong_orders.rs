@@ -144,4 +144,6 @@ fn what_depends_on_the_side_is_no_impact() {
     }
     let trial = tried(44, 89);
     assert_eq!((names(&trial), trial.verdict), (vec!["permanent_impact"], Verdict::Named));
+    // A cap that happens to cut more sales than purchases; what part is filled says nothing of the spread beside it.
+    assert_eq!(names(&tried(48, 182)), ["half_spread", "participation_cap"]);
 }
