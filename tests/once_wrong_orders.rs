@@ -147,3 +147,12 @@ fn what_depends_on_the_side_is_no_impact() {
     // A cap that happens to cut more sales than purchases; what part is filled says nothing of the spread beside it.
     assert_eq!(names(&tried(48, 182)), ["half_spread", "participation_cap"]);
 }
+
+/// Two of 619 orders and three of 519 were not filled at all, where all that was displayed would have filled them: so few were nothing.
+#[test]
+fn orders_that_were_refused_are_something_unknown() {
+    for (seed, index) in [(42, 195), (44, 79)] {
+        let trial = tried(seed, index);
+        assert_eq!((names(&trial), trial.verdict), (vec![], Verdict::Unexplained), "{seed}/{index}");
+    }
+}

@@ -8,11 +8,11 @@ use crate::sim2real::identify::{Block, Fit};
 
 /// A row of a channel without noise is off by more than this, in roundings, and more rows than one are, where something is missing.
 const FAR_OFF: f64 = 5.0;
-const FEW: usize = 4;
+const FEWEST: usize = 2;
 /// A limit that varies from order to order leaves this part of the squares at most, where it varies by a third of what it takes away.
 const VARIES: f64 = 0.1;
 
-/// Whether channels without noise are further off than their rounding, in more than a row or two, and by more than what is named
+/// Whether channels without noise are further off than their rounding, in more than one row, and by more than what is named
 /// leaves where it varies from row to row: of the squares the recalibrated twin leaves there, no more than [`VARIES`].
 pub(super) fn inexact<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> bool {
     let exact = |name: &str| is_exact(inquiry, name);
@@ -25,7 +25,7 @@ pub(super) fn inexact<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
     });
     let blocks = inquiry.problem(&selected.twin, &inquiry.evidence.compared).blocks();
     let rows = blocks.into_iter().filter(|block| exact(&block.channel)).flat_map(|block| block.range);
-    off && rows.filter(|row| selected.fit.residual[*row].abs() > FAR_OFF).count() >= FEW
+    off && rows.filter(|row| selected.fit.residual[*row].abs() > FAR_OFF).count() >= FEWEST
 }
 
 /// The parameters that nothing depends on but channels without noise, where these are explained to within their rounding: what is
