@@ -76,11 +76,13 @@ pub(super) fn summary(facts: &Facts, verdict: Verdict, effects: &[Effect]) -> St
             facts.tried.len(),
             shape(facts)
         ),
-        Verdict::Unexplained => format!(
-            "Something is missing from the {name} that no known mechanism explains: {names} takes part of it, {:.0} % of the misfit is left{}.",
-            100.0 * facts.remainder,
-            shape(facts)
-        ),
+        Verdict::Unexplained => {
+            let part = match facts.remainder {
+                left if left < 1.0 => format!("takes part of it, {:.0} % of the misfit is left", 100.0 * left),
+                _ => "goes with part of it, and is not what it is".to_owned(),
+            };
+            format!("Something is missing from the {name} that no known mechanism explains: {names} {part}{}.", shape(facts))
+        }
     }
 }
 
@@ -144,7 +146,10 @@ fn listed(names: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
+    use crate::sim2real::Site;
 
     fn fit(channel: &str, unit: &str, [recalibrated_rmse, trued_rmse]: [f64; 2]) -> ChannelFit {
         ChannelFit {
@@ -189,6 +194,45 @@ mod tests {
         assert!(named.contains("error of filled falls by 80 %"), "{named}");
         let said = summary(&facts(Some("others follow")), Verdict::Unexplained, &[]);
         assert!(said.ends_with("explains: others follow."), "{said}");
+    }
+
+    #[test]
+    fn what_only_goes_with_something_unknown_takes_no_part_of_it() {
+        let effect = Effect {
+            mechanism: "permanent_impact".into(),
+            site: Site::Plant,
+            confidence: 0.0,
+            gain: None,
+            margin: None,
+            parameters: BTreeMap::new(),
+            rivals: Vec::new(),
+            location: None,
+            active: Vec::new(),
+            moved: Vec::new(),
+        };
+        let said = |remainder| {
+            let dependence = Some(Dependence { on: "side", strength: 80.0, explained: 1.0 });
+            let facts = Facts {
+                name: "execution".into(),
+                tried: vec![("permanent_impact", "permanent impact")],
+                fits: vec![fit("cost", "bps", [0.6, 0.6])],
+                few: false,
+                remainder,
+                dependence,
+                contradiction: None,
+            };
+            summary(&facts, Verdict::Unexplained, std::slice::from_ref(&effect))
+        };
+        assert!(
+            said(0.57).ends_with(
+                "permanent impact takes part of it, 57 % of the misfit is left; what is left depends on the side."
+            )
+        );
+        assert!(
+            said(1.0).ends_with(
+                "permanent impact goes with part of it, and is not what it is; what is left depends on the side."
+            )
+        );
     }
 
     #[test]
