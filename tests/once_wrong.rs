@@ -297,3 +297,20 @@ fn what_a_law_is_off_by_has_no_name() {
         assert_eq!((names(&trial), trial.verdict), (vec![right], Verdict::Named), "seed {seed}, case {index}");
     }
 }
+
+/// A sensor of coarse steps changes back later than it changed: as long as that goes for a time that is missing, it hides what moves less
+/// than a step. Time that is missing besides is found, and what noise makes look like it is not.
+#[test]
+fn a_counter_that_changes_late_hides_nothing() {
+    for (seed, index, beside) in
+        [(51, 58, "backlash"), (66, 152, "rectification"), (65, 88, "constant_load"), (64, 188, "observation_delay")]
+    {
+        let trial = tried(seed, index);
+        assert!(
+            names(&trial) == [beside.min("quantization"), beside.max("quantization")],
+            "{seed}/{index}: {:?}",
+            trial.found
+        );
+    }
+    assert_eq!(names(&tried(64, 25)), ["quantization"]);
+}

@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::noise::median;
 use super::rivals::{self, Place};
-use super::select::Selection;
+use super::select::{ACCEPT, Selection};
+use super::weigh::gain;
 use super::{Evidence, Found, Progress};
 use crate::sim2real::{Measured, Recording, Twin};
 
@@ -22,6 +23,15 @@ const FINER: f64 = 3.0;
 
 /// Readings that change back within so many rows went back and forth by noise; what takes longer crossed twice.
 const BACK_AND_FORTH: usize = 8;
+
+/// The lag of a counter is known when it changes by less than this part of itself, or of the noise ...
+const HARDLY: f64 = 0.03;
+/// ... and after so many rounds.
+const LAGS: usize = 10;
+
+/// What looks like a time that a model lacks must tell more of itself than others: noise helps a signal over the border, and the more so the
+/// slower it is.
+const LATER: f64 = 2.5 * ACCEPT;
 
 /// Steps hide most of what is left where that is at most this many times the mean square of their rounding.
 const HIDDEN: f64 = 4.0;
@@ -40,24 +50,38 @@ pub(super) fn beneath<T: Twin>(
         return None;
     }
     let crossings = Crossings::of(inquiry.twin, recordings, found.signs.step)?;
+    let sought = |late| crossings.sought(inquiry, selection, late, progress);
+    let (by_steps, besides) = (sought(Late::BySteps), sought(Late::Besides));
+    let evidence = by_steps.0.evidence(inquiry.twin);
+    let there = Inquiry { evidence: &evidence, ..*inquiry };
+    let later = gain(&there, &by_steps.1.selected, &besides.1.selected) > LATER;
+    let (crossings, sought) = if later { besides } else { by_steps };
+    let crossings = crossings.known_by(inquiry, &sought.selected);
     let evidence = crossings.evidence(inquiry.twin);
     let there = Inquiry { evidence: &evidence, ..*inquiry };
-    let begun = there.refitted_afresh(&selection.selected);
-    let known = crossings.known_by(&there, &begun);
-    let evidence = known.evidence(inquiry.twin);
-    let there = Inquiry { evidence: &evidence, ..*inquiry };
-    Some(rivals::settled(&there, selection.resumed(&there, progress)))
+    Some(rivals::settled(&there, sought.refitted(&there)))
+}
+
+/// Why crossings come late.
+#[derive(Debug, Clone, Copy)]
+enum Late {
+    /// Counters change back later than they changed, lest they go back and forth for ever: by a part of a step, whichever way the signal
+    /// moves.
+    BySteps,
+    /// By that, and by a time that a model has yet to be given: by more where the signal moves faster.
+    Besides,
 }
 
 /// Recordings of which the first channel is known where it crosses from one step to the next, and nowhere else.
+#[derive(Clone)]
 struct Crossings<S> {
     recordings: Vec<Recording<S>>,
     held_out: Vec<Recording<S>>,
     channel: String,
     /// Standard deviation with which the signal is known there.
     noise: f64,
-    /// Of each recording and then of each that is held out, the rows of crossings, and 1 where the signal rises, -1 where it falls.
-    directions: Vec<BTreeMap<usize, f64>>,
+    /// Of each recording and then of each that is held out, the rows of crossings, and how fast the signal rises there.
+    rates: Vec<BTreeMap<usize, f64>>,
 }
 
 impl<S: Clone + Send + Sync> Crossings<S> {
@@ -65,7 +89,7 @@ impl<S: Clone + Send + Sync> Crossings<S> {
     pub fn of<T: Twin<Stimulus = S>>(twin: &T, [recordings, held_out]: [&[Recording<S>]; 2], step: f64) -> Option<Self> {
         let channel = twin.channels().first()?.name.to_string();
         let mut variances = Vec::new();
-        let mut directions = Vec::new();
+        let mut rates = Vec::new();
         let mut at_crossings = |all: &[Recording<S>], counted: bool| -> Vec<Recording<S>> {
             let mut all = all.to_vec();
             for recording in &mut all {
@@ -75,77 +99,131 @@ impl<S: Clone + Send + Sync> Crossings<S> {
                     let found = crossings(time, measured, step);
                     measured.samples.fill(None);
                     found.iter().for_each(|c| measured.samples[c.row] = Some(c.value));
-                    own.extend(found.iter().map(|c| (c.row, c.rate.signum())));
+                    own.extend(found.iter().map(|c| (c.row, c.rate)));
                     variances.extend(found.iter().filter(|_| counted).map(|c| c.variance));
                 }
-                directions.push(own);
+                rates.push(own);
             }
             all
         };
         let (recordings, held_out) = (at_crossings(recordings, true), at_crossings(held_out, false));
         let noise = (variances.iter().sum::<f64>() / variances.len().max(1) as f64).sqrt();
         let tell = variances.len() >= FEWEST && noise > 0.0 && FINER * noise <= step / 12.0_f64.sqrt();
-        tell.then_some(Self { recordings, held_out, channel, noise, directions })
+        tell.then_some(Self { recordings, held_out, channel, noise, rates })
     }
 
     /// The evidence they hold. Where a part starts they say little of.
     pub fn evidence<T: Twin<Stimulus = S>>(&self, twin: &T) -> Evidence<'_, S> {
         let mut evidence = Evidence::divide(twin, &self.recordings, &self.held_out).in_free_run();
-        evidence.anywhere = true;
+        evidence.sparse = true;
         for (weight, rounding) in evidence.weights.iter_mut().zip(&mut evidence.rounding) {
             if weight.channel == self.channel {
-                (weight.noise, *rounding) = (self.noise, 1.0);
+                (weight.noise, *rounding) = (self.noise, 0.0);
             }
         }
         evidence
     }
 
-    /// The same crossings, less what they lag behind the signal, and as well known as what `hypothesis` leaves of them has it: what
-    /// a model lacks stays much the same from one crossing to the next, and noise does not.
+    /// What is found beside `selection` where crossings come late for such a reason, and the crossings less what they lag beside that.
     ///
-    /// Counters change back later than they changed, lest they go back and forth for ever: they lag by a part of a step, whichever way
-    /// the signal moves.
-    pub fn known_by<T: Twin<Stimulus = S>>(&self, inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> Self {
-        let left = self.left(inquiry, hypothesis);
-        let lag = median(left.iter().flatten().map(|[direction, left]| -direction * left).collect()).max(0.0);
-        let caught_up = |[direction, left]: [f64; 2]| left + lag * direction;
-        let between = left.iter().flat_map(|run| run.windows(2).map(|w| (caught_up(w[1]) - caught_up(w[0])).abs()));
-        let scatter = median(between.collect()) / 0.674_489_75 / 2.0_f64.sqrt();
-        let corrected = |all: &[Recording<S>], directions: &[BTreeMap<usize, f64>]| -> Vec<Recording<S>> {
+    /// What lies between crossings that are far apart is taken for noise as long as something is missing: it is sought as if they were known
+    /// as well as they tell themselves.
+    fn sought<T: Twin<Stimulus = S>>(
+        &self,
+        inquiry: &Inquiry<'_, T>,
+        selection: &Selection<T>,
+        late: Late,
+        progress: Progress<'_>,
+    ) -> (Self, Selection<T>) {
+        let crossings = self.caught_up(inquiry, &selection.selected, late);
+        let evidence = crossings.evidence(inquiry.twin);
+        let sought = selection.resumed(&Inquiry { evidence: &evidence, ..*inquiry }, progress);
+        let crossings = crossings.caught_up(inquiry, &sought.selected, Late::BySteps);
+        let evidence = crossings.evidence(inquiry.twin);
+        let sought = sought.refitted(&Inquiry { evidence: &evidence, ..*inquiry });
+        (crossings, sought)
+    }
+
+    /// The same crossings, less what they lag behind the signal, as `hypothesis` has it: a twin takes a part of the lag for its own, and
+    /// gives it back as that is taken away.
+    fn caught_up<T: Twin<Stimulus = S>>(&self, inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, late: Late) -> Self {
+        let mut crossings = self.clone();
+        let mut hypothesis = hypothesis.clone();
+        let mut whole = 0.0_f64;
+        for _ in 0..LAGS {
+            let evidence = crossings.evidence(inquiry.twin);
+            let there = Inquiry { evidence: &evidence, ..*inquiry };
+            hypothesis = there.refitted_afresh(&hypothesis);
+            let left = crossings.left(&there, &hypothesis);
+            let lag = match late {
+                Late::BySteps => median(left.iter().flatten().map(|[rate, left]| -rate.signum() * left).collect()),
+                Late::Besides => by_steps(&left.concat()),
+            };
+            if lag.abs() <= HARDLY * whole.max(self.noise) {
+                break;
+            }
+            whole += lag;
+            crossings = crossings.moved(lag);
+        }
+        crossings
+    }
+
+    /// The same crossings, later by that much of the signal.
+    fn moved(&self, lag: f64) -> Self {
+        let corrected = |all: &[Recording<S>], rates: &[BTreeMap<usize, f64>]| -> Vec<Recording<S>> {
             let mut all = all.to_vec();
-            for (recording, directions) in all.iter_mut().zip(directions) {
+            for (recording, rates) in all.iter_mut().zip(rates) {
                 for measured in recording.measured.iter_mut().filter(|m| m.channel == self.channel) {
-                    for (row, direction) in directions {
-                        measured.samples[*row] = measured.samples[*row].map(|value| value + lag * direction);
+                    for (row, rate) in rates {
+                        measured.samples[*row] = measured.samples[*row].map(|value| value + lag * rate.signum());
                     }
                 }
             }
             all
         };
-        let (own, of_held_out) = self.directions.split_at(self.recordings.len());
+        let (own, of_held_out) = self.rates.split_at(self.recordings.len());
         Self {
             recordings: corrected(&self.recordings, own),
             held_out: corrected(&self.held_out, of_held_out),
-            channel: self.channel.clone(),
-            noise: self.noise.max(scatter),
-            directions: self.directions.clone(),
+            ..self.clone()
         }
     }
 
-    /// What `hypothesis` leaves of the crossings, in the channel's unit, beside their directions: one run a part.
+    /// The same, as well known as what `hypothesis` leaves of them has it: what a model lacks stays much the same from one crossing to
+    /// the next, and noise does not.
+    pub fn known_by<T: Twin<Stimulus = S>>(&self, inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> Self {
+        let evidence = self.evidence(inquiry.twin);
+        let there = Inquiry { evidence: &evidence, ..*inquiry };
+        let left = self.left(&there, &there.refitted_afresh(hypothesis));
+        let between = left.iter().flat_map(|run| run.windows(2).map(|w| (w[1][1] - w[0][1]).abs()));
+        let scatter = median(between.collect()) / 0.674_489_75 / 2.0_f64.sqrt();
+        Self { noise: self.noise.max(scatter), ..self.clone() }
+    }
+
+    /// What `hypothesis` leaves of the crossings, in the channel's unit, beside the rates there: one run a part.
     fn left<T: Twin<Stimulus = S>>(&self, inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> Vec<Vec<[f64; 2]>> {
         let parts = &inquiry.evidence.compared;
         let blocks = inquiry.problem(&hypothesis.twin, parts).blocks();
         let own = blocks.iter().filter(|block| block.channel == self.channel);
         own.filter_map(|block| {
             let name = &parts[block.part].recording.name;
-            let directions = &self.directions[self.recordings.iter().position(|r| r.name == *name)?];
+            let rates = &self.rates[self.recordings.iter().position(|r| r.name == *name)?];
             let left = &hypothesis.fit.residual.as_slice()[block.range.clone()];
-            let beside = |(row, left): (&usize, &f64)| [directions.get(row).copied().unwrap_or(0.0), self.noise * left];
+            let beside = |(row, left): (&usize, &f64)| [rates.get(row).copied().unwrap_or(0.0), self.noise * left];
             Some(block.rows.iter().zip(left).map(beside).collect())
         })
         .collect()
     }
+}
+
+/// By what crossings come late that leave so much, each beside the rate there, whichever way the signal moves, where they may come late by
+/// a time besides: least squares in both.
+fn by_steps(left: &[[f64; 2]]) -> f64 {
+    let sum = |of: fn(f64, f64) -> f64| left.iter().map(|[rate, left]| of(rate.abs(), -rate.signum() * left)).sum::<f64>();
+    let (pace, square) = (sum(|pace, _| pace), sum(|pace, _| pace * pace));
+    let (late, by_pace) = (sum(|_, late| late), sum(|pace, late| pace * late));
+    let determinant = left.len() as f64 * square - pace * pace;
+    if determinant > 0.0 { (square * late - pace * by_pace) / determinant } else { 0.0 }
 }
 
 /// One crossing: the signal at the row nearest to it, and how well that is known.

@@ -39,8 +39,9 @@ pub struct Evidence<'a, S> {
     pub rounding: Vec<f64>,
     /// Length of the windows [s], where there are any.
     pub window: Option<f64>,
-    /// Whether parts start anywhere: what was measured next to their starts says nothing of these.
-    pub anywhere: bool,
+    /// Whether rows are few and far between, each of which tells as much as many: those next to the start of a part say nothing of it,
+    /// and noise has forgotten itself from one to the next.
+    pub sparse: bool,
 }
 
 impl<'a, S: Send + Sync> Evidence<'a, S> {
@@ -72,7 +73,7 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
             Some(seconds) => free_run.iter().flat_map(|p| p.windows(seconds)).collect(),
             None => free_run.clone(),
         };
-        Self { free_run, compared, held_out: apart, how, weights, rounding, window, anywhere: false }
+        Self { free_run, compared, held_out: apart, how, weights, rounding, window, sparse: false }
     }
 
     /// The same evidence, in which hypotheses are compared in free run whatever the plant is.
@@ -85,7 +86,7 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
             weights: self.weights.clone(),
             rounding: self.rounding.clone(),
             window: None,
-            anywhere: self.anywhere,
+            sparse: self.sparse,
         }
     }
 
@@ -107,7 +108,7 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
 
     /// The initial states with which parts are compared: windows start wherever fits best.
     pub(super) fn initial_state<T: Simulator<Stimulus = S>>(&self, problem: &Problem<'_, T>) -> State {
-        if self.window.is_some() || self.anywhere { State::unknown(problem) } else { State::estimated(problem) }
+        if self.window.is_some() || self.sparse { State::unknown(problem) } else { State::estimated(problem) }
     }
 
     /// The state from which a simulator at `theta` best starts a held-out part: estimated from the rows before it where a

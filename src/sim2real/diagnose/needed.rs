@@ -117,7 +117,7 @@ pub(super) fn needed<T: Twin>(
     let few = restored >= FEW_ROWS && restored as f64 >= MOST * moved as f64 || restored >= FEWEST_ROWS && restored == moved;
     let pairs: Vec<[f64; 2]> = (0..rows).map(|i| [less.fit.residual[i], whole.fit.residual[i]]).collect();
     let seen = inquiry.twin.clock() == Clock::Event && (few || takes_away(&pairs) || most_of_few(moved, rows));
-    let many = rows > MANY_ROWS || gain(inquiry, less, whole) > DECISIVE;
+    let many = rows > MANY_ROWS || inquiry.evidence.sparse || gain(inquiry, less, whole) > DECISIVE;
     let spread = many && second * second >= INFORMATIVE_ROWS as f64 * fourth;
     enough && (spread || seen || moved >= INFORMATIVE_ROWS)
 }
