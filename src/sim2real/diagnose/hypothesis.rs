@@ -244,6 +244,7 @@ impl<T: Twin> Inquiry<'_, T> {
     fn weighed(&self, twin: T, added: Vec<usize>, fit: Fit, blocks: &[Block]) -> Hypothesis<T> {
         let mut misfits = channel_misfits(fit.residual.as_slice(), blocks, |channel| self.evidence.rounding_of(channel));
         if self.evidence.sparse {
+            // What remembers itself from one such row to the next is no noise.
             misfits.iter_mut().for_each(|misfit| misfit.level = 1.0);
         }
         Hypothesis { twin, added, fit, misfits }
