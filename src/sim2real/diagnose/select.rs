@@ -37,7 +37,7 @@ const FINISHED: usize = 5;
 const FAR_BEHIND: f64 = 0.5;
 /// ... unless it leaves no more than this many times as much: with residuals as correlated as theirs, gains say little.
 const AS_MUCH: f64 = 1.5;
-/// Mechanisms of which all forms are fitted: those that stood best in the form that screening liked best.
+/// Mechanisms of several forms of which all are fitted: those that stood best in the form that screening liked best.
 const IN_ALL_FORMS: usize = 3;
 /// So are those of mechanisms, and of so many at the most, whose signature promised to explain this part of the misfit and more, and
 /// whose fit came to less than this part of what was promised: screening likes a form for what it does at its starts.
@@ -300,10 +300,12 @@ fn further_forms<T: Twin>(
 ) -> Vec<bool> {
     let name = |number: usize| inquiry.candidates[number].about.name;
     let own = jobs.iter().zip(brief).filter(|((place, _, _), _)| *place == 0);
+    // What has one form alone takes the place of nothing that has others.
+    let has_others = |added: &str| inquiry.candidates.iter().filter(|c| !c.general && c.about.name == added).count() > 1;
     let mut best: Vec<&str> = Vec::new();
     for child in ranked(inquiry, parent, own.filter_map(|(_, child)| child.clone()).collect()) {
         let added = child.added.last().map_or("", |number| name(*number));
-        if best.len() < IN_ALL_FORMS && !best.contains(&added) {
+        if best.iter().filter(|name| has_others(name)).count() < IN_ALL_FORMS && !best.contains(&added) {
             best.push(added);
         }
     }
