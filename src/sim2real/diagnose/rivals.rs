@@ -46,6 +46,9 @@ const HARDLY_LEFT: f64 = 2.0;
 /// One of several that is less likely than this beside its rivals is worth no name at all.
 const HARDLY_IT: f64 = 0.05;
 
+/// Evidence above which what is explained away, and whitens all that is left, is no error of another law's form.
+const NO_ERROR_OF_FORM: f64 = 200.0;
+
 /// A law that has another form than the real thing leaves so much of the first misfit: 2 % of what it explains, squared. What is named
 /// besides explains more, where without it hardly anything is left.
 const OFF_BY: f64 = 5e-4;
@@ -86,8 +89,14 @@ fn anybodys<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, places:
             || likely < HARDLY_IT
             || of_another
             || stand_in(places) == Some(*place)
-            || little && sampled && !carries_over(inquiry, less, whole)
+            || little && sampled && !beyond_doubt(inquiry, less, whole) && !carries_over(inquiry, less, whole)
     })
+}
+
+/// Whether `whole` leaves nothing but noise of what `less` leaves above it, by so much evidence that no error of form does: where a run is
+/// hard to foretell, either half of the recordings says too little of the other.
+fn beyond_doubt<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, whole: &Hypothesis<T>) -> bool {
+    completes(less, whole) && gain(inquiry, less, whole) > NO_ERROR_OF_FORM
 }
 
 /// The one of three or more that is hardly likelier than not, or to have the right one among its rivals, where all others are. Where
