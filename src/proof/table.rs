@@ -25,6 +25,12 @@ pub(super) fn figures(domain: Domain, entries: &[Entry], reliability: &Reliabili
     let ece =
         ece.meaning("mean distance of the confidence of a name and how often names of such confidence are right (ECE)");
     all.push(ece.wanting(goals.calibration));
+    let median = reliability.by_chance.map(|[median, ..]| median);
+    let chance = Figure {
+        interval: reliability.by_chance.map(|[_, low, high]| [low, high]),
+        ..Figure::number("the same by chance", median, reliability.of)
+    };
+    all.push(chance.meaning("what it comes to of as many names that are right just as often as their confidences say"));
     let seconds = Figure::quantile("time of a diagnosis", Unit::Seconds, 0.5, entries.iter().map(|e| e.trial.seconds));
     all.push(seconds.meaning("median, with as many under way at once as there are threads").wanting(goals.seconds));
     all.extend(further(&entries));
