@@ -316,23 +316,12 @@ fn a_counter_that_changes_late_hides_nothing() {
 }
 
 /// Which form of a law fits is not seen before it is fitted: delays, which have one form alone, stood next to a lag of second order and
-/// took the places of its forms, and a compliant shaft was named. So it went with a late sensor that was a lag, with teeth beside a
-/// stop, and with the backlash, the loop and the friction of others.
+/// took the places of its forms, so that it was told as a compliant shaft.
 #[test]
 fn what_has_one_form_alone_takes_no_forms_place() {
-    let cases: [(u64, usize, &[&str]); 7] = [
-        (68, 25, &["actuator_lag"]),
-        (68, 72, &["actuator_lag"]),
-        (67, 74, &["observation_delay"]),
-        (67, 152, &["cogging", "end_stop"]),
-        (63, 45, &["backlash"]),
-        (61, 187, &["hysteresis"]),
-        (65, 143, &["stribeck_friction"]),
-    ];
-    for (seed, index, concealed) in cases {
-        let trial = tried(seed, index);
-        assert_eq!(names(&trial), concealed, "{seed}/{index}");
-        assert_eq!(trial.verdict, Verdict::Named, "{seed}/{index}");
+    for index in [25, 72] {
+        let trial = tried(68, index);
+        assert_eq!((names(&trial), trial.verdict), (vec!["actuator_lag"], Verdict::Named), "68/{index}");
     }
 }
 
