@@ -315,8 +315,8 @@ fn a_counter_that_changes_late_hides_nothing() {
     assert_eq!(names(&tried(64, 25)), ["quantization"]);
 }
 
-/// Which form of a law fits is not seen before it is fitted: delays, which have one form alone, stood next to a lag of second order and
-/// took the places of its forms, so that it was told as a compliant shaft.
+/// Which form of a law fits is not seen before it is fitted: a late sensor, which has one form alone, stood before a lag of second order and
+/// took the place of the forms of that, so that it was told as a compliant shaft.
 #[test]
 fn what_has_one_form_alone_takes_no_forms_place() {
     for index in [25, 72] {
