@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+use std::fmt::Write as _;
+
 use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
 use trueup::sim2real::diagnose::{Verdict, diagnose};
 use trueup::sim2real::{Assembly, DerivativeOf, Measured, Parameter, Pid, Recording, Seed, Simulator, Thetas, Typical};
@@ -146,21 +148,77 @@ fn the_controller_stands_between_sensor_and_driver() {
     assert!((limited - (0.3 * 1.5 / 2.0_f64).asin()).abs() < 1e-3, "{limited}");
 }
 
-#[test]
-fn dry_friction_is_named_in_a_closed_loop() {
-    let mut goals = set_points(2_400);
-    let samples = reference(&goals, 5, DerivativeOf::Measurement, 0.25);
-    // A sensor whose noise is spread evenly over 1 mrad.
+/// What a sensor makes of angles whose noise is spread evenly over 1 mrad.
+fn sensed(angles: Vec<f64>) -> Vec<f64> {
     let mut drawn = 1_u64;
     let mut noisy = |q: f64| {
         drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        Some(q + 1e-3 * ((drawn >> 11) as f64 / (1_u64 << 53) as f64 - 0.5))
+        q + 1e-3 * ((drawn >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
     };
-    let samples = samples.into_iter().map(&mut noisy).collect();
+    angles.into_iter().map(&mut noisy).collect()
+}
+
+#[test]
+fn dry_friction_is_named_in_a_closed_loop() {
+    let mut goals = set_points(2_400);
+    let samples = sensed(reference(&goals, 5, DerivativeOf::Measurement, 0.25)).into_iter().map(Some).collect();
     goals.measured = vec![Measured { channel: "position".into(), unit: "rad".into(), samples }];
     let twin = Assembly::new(arm(), MECHANISMS).controlled_by(pid(Some(5e-3), DerivativeOf::Measurement));
     let found = diagnose(&twin, &[goals], &[], Seed(0), &|_, _, _| {}).diagnosis;
     assert_eq!(found.verdict, Verdict::Named, "{}", found.summary);
     assert_eq!(found.effects[0].mechanism, "coulomb_friction", "{}", found.summary);
     assert!((found.effects[0].parameters["torque"].value - 0.25).abs() < 0.02, "{:?}", found.effects[0]);
+}
+
+/// Diagnoses, on the command line, an arm whose controller acts every so many milliseconds, by a twin that does not say how often.
+/// Gives the diagnosis and the trued twin.
+fn diagnosed_unpaced(every: usize, friction: f64) -> (serde_json::Value, String) {
+    let folder = tempfile::TempDir::new().unwrap();
+    let goals = set_points(2_400);
+    let mut table = String::from("t,goal,q\n");
+    let samples = sensed(reference(&goals, every, DerivativeOf::Measurement, friction));
+    for ((time, goal), q) in goals.time.iter().zip(&goals.stimulus.0).zip(samples) {
+        writeln!(table, "{time},{goal},{q}").unwrap();
+    }
+    let ([inertia, viscous, gravity, gain], [kp, ki, kd, limit]) = (ARM, GAINS);
+    let twin = format!(
+        "[twin]\nmodel = \"joint\"\n\n[parameters]\n\
+         inertia = {{ value = {inertia}, unit = \"kg m^2\", uncertainty = 0.2 }}\n\
+         viscous_friction = {{ value = {viscous}, unit = \"N m s/rad\", uncertainty = 0.2 }}\n\
+         gravity_torque = {{ value = {gravity}, unit = \"N m\", uncertainty = 0.2 }}\n\
+         gain = {{ value = {gain}, unit = \"N m per unit\", uncertainty = 0 }}\n\n\
+         [channels]\ncommand = {{ column = \"goal\" }}\nposition = {{ column = \"q\", unit = \"rad\" }}\n\n\
+         [controller]\nkind = \"pid\"\nkp = {{ value = {kp} }}\nki = {{ value = {ki} }}\nkd = {{ value = {kd} }}\n\
+         limit = {{ value = {limit} }}\n"
+    );
+    std::fs::write(folder.path().join("twin.toml"), twin).unwrap();
+    std::fs::write(folder.path().join("log.csv"), table).unwrap();
+    let run = assert_cmd::Command::new(assert_cmd::cargo::cargo_bin!("trueup"))
+        .current_dir(folder.path())
+        .args(["diagnose", "twin.toml", "--recording", "log.csv", "--out", "found"])
+        .output()
+        .unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("found").join(name)).unwrap();
+    (serde_json::from_str(&read("diagnosis.json")).unwrap(), read("trued.toml"))
+}
+
+/// A loop of a microcontroller that logs each of its turns, by a twin whose controller acts at every step of integration: taken as
+/// such, what the half of a row makes of the motion would be told as something that is missing.
+#[test]
+fn a_controller_that_is_not_said_to_wait_acts_as_often_as_the_recording_shows() {
+    let (whole, trued) = diagnosed_unpaced(5, 0.0);
+    assert_eq!(whole["verdict"], "no_mismatch", "{}", whole["summary"]);
+    assert!(trued.contains("period = 0.005"), "{trued}");
+    let notes = whole["checks"]["notes"].to_string();
+    assert!(notes.contains("once a row, every 0.00500 s"), "{notes}");
+
+    let (rubbing, trued) = diagnosed_unpaced(5, 0.25);
+    assert_eq!(rubbing["effects"][0]["mechanism"], "coulomb_friction", "{}", rubbing["summary"]);
+    assert_eq!(rubbing["effects"].as_array().unwrap().len(), 1, "{}", rubbing["summary"]);
+    assert!(trued.contains("period = 0.005"), "{trued}");
+
+    let (fast, trued) = diagnosed_unpaced(1, 0.25);
+    assert_eq!(fast["effects"][0]["mechanism"], "coulomb_friction", "{}", fast["summary"]);
+    assert!(!trued.contains("period"), "{trued}");
 }

@@ -128,6 +128,7 @@ fn told(screen: &Screen, calibration: &Calibration, twin: &FittedTwin) -> String
     let mut parameters = screen.table(["parameter", "unit", ">as given", ">calibrated", ""]);
     for (name, p) in twin.named() {
         let remark = match () {
+            () if p.frozen && p.nominal == 0.0 => "fixed: an uncertainty is a part of the value",
             () if p.frozen => "known exactly: not fitted",
             () if p.at_bound => "at its bound",
             () => "",

@@ -78,7 +78,7 @@ impl Demo {
         if let Some(told) = concealed(set) {
             text += &format!("\nWhat the generator had concealed\n\n{told}\n");
         }
-        let paths = write(diagnosed, &file, &folder.join(DIAGNOSIS), overwrite)?;
+        let paths = write(diagnosed, &folder.join(DIAGNOSIS), overwrite)?;
         if let Some(report) = paths.iter().find(|path| path.extension().is_some_and(|ending| ending == "html")) {
             text += &format!("\nReport: {}\n\n", report.display());
         }

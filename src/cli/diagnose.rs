@@ -104,7 +104,7 @@ impl Diagnose {
         let mut text = if self.json { json(&diagnosed.diagnosis)? } else { told::diagnosis(screen, &diagnosed.diagnosis) };
         let verdict = diagnosed.diagnosis.verdict;
         if let Some(folder) = &self.out {
-            let paths = write(diagnosed, &file, folder, overwrite)?;
+            let paths = write(diagnosed, folder, overwrite)?;
             if !self.json {
                 text += &screen::written(&paths);
             }
@@ -126,13 +126,8 @@ fn json(diagnosis: &Diagnosis) -> Result<String, Stop> {
 }
 
 /// Writes what a diagnosis leaves into `folder`; gives the paths.
-pub(super) fn write(
-    diagnosed: Diagnosed,
-    file: &TwinFile,
-    folder: &Path,
-    overwrite: Overwrite,
-) -> Result<Vec<PathBuf>, Stop> {
-    let diagnosis = &diagnosed.diagnosis;
+pub(super) fn write(diagnosed: Diagnosed, folder: &Path, overwrite: Overwrite) -> Result<Vec<PathBuf>, Stop> {
+    let (diagnosis, file) = (&diagnosed.diagnosis, &diagnosed.file);
     let experiment = diagnosed.excitation.as_ref().map(|excitation| commands(excitation, file));
     let figures = figures(diagnosed.comparisons, diagnosed.profiles, diagnosed.excitation);
     let page = diagnosis_page(diagnosis, &figures)?;

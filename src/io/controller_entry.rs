@@ -22,7 +22,7 @@ pub struct ControllerEntry {
     pub kd: Option<Exactly>,
     /// What the output saturates at [unit of the command].
     pub limit: Option<Exactly>,
-    /// How often it acts [s]; left out, at every step.
+    /// How often it acts [s]; left out, at every step, or in a diagnosis once a row where that explains the recordings better.
     pub period: Option<f64>,
     /// What its derivative is taken of.
     #[serde(default)]
@@ -68,7 +68,9 @@ impl ControllerEntry {
         }
         if let Some(period) = self.period.filter(|period| !period.is_finite() || *period <= 0.0) {
             let error = document.error(&["controller", "period"], "expected a period above 0").found(period);
-            return Err(error.hint("it is in seconds; left out, the controller acts at every step"));
+            return Err(error.hint(
+                "it is in seconds; left out, the controller acts at every step, or once a row where recordings show it",
+            ));
         }
         Ok(())
     }

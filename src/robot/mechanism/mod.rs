@@ -42,14 +42,14 @@ use crate::sim2real::mechanism::{
     Quantization, RateLimit, Rectification, Saturation, Scale, ThermalDerating,
 };
 
-/// The rows of a plant's registry: its delays, which of its channels are rates of others, and its own rows. The same generic
+/// The rows of a plant's registry: its delays and lags, which of its channels are rates of others, and its own rows. The same generic
 /// rows stand in each, and Rust has no generic statics: written out, every new mechanism would have to be listed once a
 /// plant.
 macro_rules! rows {
     // A plant with a coordinate that moves.
-    (motion, delays $delays:expr, rates $rates:expr) => {
+    (motion, delays $delays:expr, lags $lags:expr, rates $rates:expr) => {
         rows!(
-            signals, delays $delays, rates $rates,
+            signals, delays $delays, lags $lags, rates $rates,
             plant [
                 &Backlash, &ConstantLoad, &CoulombFriction, &StribeckFriction, &LoadFriction, &QuadraticDrag, &Stiffness,
                 &CubicStiffness, &Cogging, &PayloadChange, &EndStop, &Compliance, &Hysteresis
@@ -59,13 +59,13 @@ macro_rules! rows {
     };
     // Any plant whose commands and observations are signals.
     (
-        signals, delays $delays:expr, rates $rates:expr, plant [$($own:expr),*], sensor [$($read:expr),*]
+        signals, delays $delays:expr, lags $lags:expr, rates $rates:expr, plant [$($own:expr),*], sensor [$($read:expr),*]
     ) => {
         &[
             &CommandDelay { longest: $delays.0, starts: $delays.1, holds: true },
             &DeadZone,
             &Saturation,
-            &ActuatorLag,
+            &ActuatorLag { longest: $lags.0, starts: $lags.1 },
             &RateLimit,
             &ThermalDerating,
             &GainError,
@@ -92,20 +92,27 @@ const OF_PROCESSES: Delays = (120.0, &[1.0, 4.0, 16.0]);
 /// Of what may be either.
 const OF_ANYTHING: Delays = (120.0, &[0.004, 0.02, 0.08, 1.0, 4.0]);
 
+/// The same of lags: time constants rather than dead times.
+const LAGS_OF_SERVOS: Delays = (2.0, &[0.01, 0.05]);
+const LAGS_OF_PROCESSES: Delays = (480.0, &[2.0, 10.0, 40.0]);
+const LAGS_OF_ANYTHING: Delays = (480.0, &[0.01, 0.05, 1.0, 10.0]);
+
 /// The joint's registry.
-pub static MECHANISMS: Registry<Joint> = rows!(motion, delays OF_SERVOS, rates &[(0, 1)]);
+pub static MECHANISMS: Registry<Joint> = rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates &[(0, 1)]);
 
 /// The registry of a cart with a pole: mechanisms of motion act on the cart.
-pub static CART_POLE_MECHANISMS: Registry<CartPole> = rows!(motion, delays OF_SERVOS, rates &[(0, 1), (2, 3)]);
+pub static CART_POLE_MECHANISMS: Registry<CartPole> =
+    rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates &[(0, 1), (2, 3)]);
 
 /// The registry of a pendulum.
-pub static PENDULUM_MECHANISMS: Registry<Pendulum> = rows!(motion, delays OF_SERVOS, rates &[(0, 1)]);
+pub static PENDULUM_MECHANISMS: Registry<Pendulum> = rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates &[(0, 1)]);
 
 /// The registry of two tanks: levels are not below 0, and no encoder turns with them.
-pub static TANKS_MECHANISMS: Registry<Tanks> = rows!(signals, delays OF_PROCESSES, rates &[], plant [&Overflow], sensor []);
+pub static TANKS_MECHANISMS: Registry<Tanks> =
+    rows!(signals, delays OF_PROCESSES, lags LAGS_OF_PROCESSES, rates &[], plant [&Overflow], sensor []);
 
 /// The registry of equations, which may be of anything; mechanisms of motion act where the equations say what moves.
-pub static EQUATIONS_MECHANISMS: Registry<Equations> = rows!(motion, delays OF_ANYTHING, rates &[]);
+pub static EQUATIONS_MECHANISMS: Registry<Equations> = rows!(motion, delays OF_ANYTHING, lags LAGS_OF_ANYTHING, rates &[]);
 
 #[cfg(test)]
 mod tests {

@@ -135,6 +135,12 @@ fn library(effects: &[Effect]) -> f64 {
     effects.iter().map(known).product()
 }
 
+/// What of the first misfit may be left for an error of form. What the motion foretells of the rest is physics: it is excused as that of
+/// a law's form only as far as it is likely that the law is the right one.
+fn form_error(library: f64, foretold: f64, sampled: bool) -> f64 {
+    if sampled && foretold > FORETOLD { FORM_ERROR * library } else { FORM_ERROR }
+}
+
 /// How likely it must be at least that what was named is the library's; `unseen` is whether it fails on held-out data.
 fn least_likely(effects: &[Effect], unseen: bool) -> f64 {
     match effects {
@@ -186,7 +192,9 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
     let doubtful = findings.sampled && library(effects) < least_likely(effects, unseen);
     let unexplained = left_over || findings.inexact || findings.sampled && slowly_above(&selection.selected, SLOWLY_LEFT);
-    if doubtful || findings.beyond || unexplained && (findings.remainder > FORM_ERROR || findings.foretold > FORETOLD_WELL) {
+    let too_much = findings.remainder > form_error(library(effects), findings.foretold, findings.sampled)
+        || findings.foretold > FORETOLD_WELL;
+    if doubtful || findings.beyond || unexplained && too_much {
         return Verdict::Unexplained;
     }
     if unseen || effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
@@ -318,6 +326,15 @@ mod tests {
         assert_eq!(library(&[effect(0.6, &[0.6])]), 1.0);
         assert!(library(&[effect(0.9, &[]), effect(0.3, &[]), effect(0.2, &[])]) < HARDLY_THE_LIBRARY);
         assert_eq!(library(&[]), 1.0);
+    }
+
+    #[test]
+    fn what_the_motion_foretells_is_excused_as_far_as_the_names_are_likely() {
+        let two_unsure = library(&[effect(0.55, &[]), effect(0.4, &[])]);
+        assert!((form_error(two_unsure, 0.12, true) - 0.22 * FORM_ERROR).abs() < 1e-12);
+        assert_eq!(form_error(library(&[effect(0.6, &[0.4])]), 0.12, true), FORM_ERROR, "one of them it is");
+        assert_eq!(form_error(two_unsure, 0.08, true), FORM_ERROR, "nothing foretells it");
+        assert_eq!(form_error(two_unsure, 0.12, false), FORM_ERROR, "of messages it is known what is asked");
     }
 
     #[test]

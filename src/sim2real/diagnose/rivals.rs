@@ -153,7 +153,7 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
                 tried.par_iter().map(one).collect()
             };
             let mut others = losses(likely(inquiry, selection, &screened, *own));
-            others.extend(losses(further_forms(inquiry, &screened, &others)));
+            others.extend(losses(further_forms(inquiry, &screened, &others, *own)));
             best_forms(inquiry, &mut others);
             let nearest = others.iter().map(|(_, loss)| *loss).filter(|loss| loss.is_finite()).min_by(f64::total_cmp);
             Place { gain: whole, nearest, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
@@ -196,15 +196,19 @@ fn likely<'s, T: Twin>(
     kept
 }
 
-/// The forms not tried yet of the rivals that come near.
+/// The forms not tried yet of the rivals that come near, and of the special cases of candidate `own`: one of these is as good as that law
+/// where it is all that shows of it, and the form that screening likes best may lead nowhere.
 fn further_forms<'s, T: Twin>(
     inquiry: &Inquiry<'_, T>,
     screened: &'s [Screened],
     tried: &[(usize, f64)],
+    own: usize,
 ) -> Vec<&'s Screened> {
     let name = |number: usize| inquiry.candidates[number].about.name;
     let near = |one: &Screened| tried.iter().any(|(other, loss)| *loss < NEAR && name(*other) == name(one.number));
-    screened.iter().filter(|one| near(one) && !tried.iter().any(|(other, _)| *other == one.number)).collect()
+    let special = |one: &Screened| inquiry.candidates[own].about.contains.contains(&name(one.number));
+    let untried = |one: &Screened| !tried.iter().any(|(other, _)| *other == one.number);
+    screened.iter().filter(|one| (near(one) || special(one)) && untried(one)).collect()
 }
 
 /// Leaves each mechanism in the form that loses least.

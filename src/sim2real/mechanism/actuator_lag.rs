@@ -13,7 +13,12 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 ///
 /// Source: first-order actuator, Åström & Murray, *Feedback Systems* (2nd ed. 2021), section 3.3.
 #[derive(Debug, Clone, Copy)]
-pub struct ActuatorLag;
+pub struct ActuatorLag {
+    /// The longest time constant, as its domain bounds it [s].
+    pub longest: f64,
+    /// Where fits begin [s].
+    pub starts: &'static [f64],
+}
 
 impl<P: Plant> Mechanism<P> for ActuatorLag
 where
@@ -32,8 +37,9 @@ where
     }
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
-        let time = |name| Parameter::new(name, "s", 0.0).within(0.0, 2.0).starting_at(&[0.01, 0.05]);
-        let shorter = |name| Parameter::new(name, "s", 0.0).within(0.0, 2.0).starting_at(&[0.005]);
+        let lasting = |name, starts: &[f64]| Parameter::new(name, "s", 0.0).within(0.0, self.longest).starting_at(starts);
+        let time = |name| lasting(name, self.starts);
+        let shorter = |name| lasting(name, &[0.5 * self.starts[0]]);
         vec![
             Form { name: "first_order", parameters: vec![time("time_constant")] },
             Form { name: "two_stage", parameters: vec![time("total_time")] },
@@ -170,22 +176,24 @@ mod tests {
     use super::super::wire::shaped;
     use super::*;
 
+    const LAG: ActuatorLag = ActuatorLag { longest: 2.0, starts: &[0.01, 0.05] };
+
     /// Two poles answer a step by `1 - (a exp(-t/a) - b exp(-t/b)) / (a - b)`, as two lags in a row do, and as one where the
     /// other is at once.
     #[test]
     fn two_poles_answer_as_two_lags_in_a_row() {
         let (a, b, step) = (0.05, 0.02, 1e-4);
         let commands: Vec<f64> = (0..2_001).map(|k| if k == 0 { 0.0 } else { 1.0 }).collect();
-        let out = shaped(&ActuatorLag, 2, &[&[a, b], &[b, a], &[a, 0.0]], step, &commands);
+        let out = shaped(&LAG, 2, &[&[a, b], &[b, a], &[a, 0.0]], step, &commands);
         for k in [101_usize, 501, 1_001, 2_000] {
             // The mean over a tick of the answer to what began with tick 1.
             let t = (k as f64 - 0.5) * step;
             let exact = 1.0 - (a * (-t / a).exp() - b * (-t / b).exp()) / (a - b);
             assert!((out[0][k] - exact).abs() < 1e-5 && (out[1][k] - exact).abs() < 1e-5, "{k}: {} not {exact}", out[0][k]);
         }
-        let half = shaped(&ActuatorLag, 1, &[&[2.0 * b]], step, &commands);
-        assert_eq!(half, shaped(&ActuatorLag, 2, &[&[b, b]], step, &commands));
-        let one = &shaped(&ActuatorLag, 0, &[&[a]], step, &commands)[0];
+        let half = shaped(&LAG, 1, &[&[2.0 * b]], step, &commands);
+        assert_eq!(half, shaped(&LAG, 2, &[&[b, b]], step, &commands));
+        let one = &shaped(&LAG, 0, &[&[a]], step, &commands)[0];
         assert!(out[2].iter().zip(one).all(|(two, one)| (two - one).abs() < 1e-12));
     }
 
@@ -195,10 +203,10 @@ mod tests {
         let (a, b, step) = (0.05, 0.02, 0.01);
         let stepped: Vec<f64> = (0..101).map(|k| if k == 0 { 0.0 } else { 1.0 }).collect();
         for (form, before, thetas) in [(3, 0, &[a][..]), (4, 2, &[a, b])] {
-            let out = &shaped(&ActuatorLag, form, &[thetas], step, &stepped[1..])[0];
-            let after_a_zero = &shaped(&ActuatorLag, before, &[thetas], step, &stepped)[0][1..];
+            let out = &shaped(&LAG, form, &[thetas], step, &stepped[1..])[0];
+            let after_a_zero = &shaped(&LAG, before, &[thetas], step, &stepped)[0][1..];
             assert!(out.iter().zip(after_a_zero).all(|(own, other)| (own - other).abs() < 1e-12), "form {form}");
-            assert_eq!(shaped(&ActuatorLag, before, &[thetas], step, &stepped[1..])[0], stepped[1..]);
+            assert_eq!(shaped(&LAG, before, &[thetas], step, &stepped[1..])[0], stepped[1..]);
         }
     }
 }
