@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
+#[cfg(feature = "cli")]
 use std::fmt::Write as _;
 
 use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
@@ -172,6 +173,7 @@ fn dry_friction_is_named_in_a_closed_loop() {
 
 /// Diagnoses, on the command line, an arm whose controller acts every so many milliseconds, by a twin that does not say how often.
 /// Gives the diagnosis and the trued twin.
+#[cfg(feature = "cli")]
 fn diagnosed_unpaced(every: usize, friction: f64) -> (serde_json::Value, String) {
     let folder = tempfile::TempDir::new().unwrap();
     let goals = set_points(2_400);
@@ -205,6 +207,7 @@ fn diagnosed_unpaced(every: usize, friction: f64) -> (serde_json::Value, String)
 
 /// A loop of a microcontroller that logs each of its turns, by a twin whose controller acts at every step of integration: taken as
 /// such, what the half of a row makes of the motion would be told as something that is missing.
+#[cfg(feature = "cli")]
 #[test]
 fn a_controller_that_is_not_said_to_wait_acts_as_often_as_the_recording_shows() {
     let (whole, trued) = diagnosed_unpaced(5, 0.0);
