@@ -237,30 +237,12 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
     }
 
     /// One step: the best of several dampings, or none where more damping does not help either.
-    ///
-    /// Initial states move along as far as a linear plant would have them. Where dry friction, a stop or a pendulum near its top make
-    /// something else of so long a step, no damping of the parameters alone helps: then they are held back as the parameters are.
     fn step(&mut self) {
-        let begun = self.damping;
-        if self.lowered(|_| 1.0) {
-            return;
-        }
-        self.damping = begun.max(1.0);
-        if !self.lowered(|damping| 1.0 / (1.0 + damping)) {
-            self.fell = 0.0;
-            self.ended = true;
-        }
-    }
-
-    /// Makes the step of the least damping that lowers the objective, if there is one. Of the step of the initial states, so great a
-    /// share is made at each damping.
-    fn lowered(&mut self, share: impl Fn(f64) -> f64) -> bool {
         let (information, gradient) = self.normal_equations();
         let held = self.held(&gradient);
         while self.damping < STUCK {
-            let dampings = SPREAD.map(|s| s * self.damping);
-            let moved = |damping: &f64| self.moved(&damped_step(&information, &gradient, &held, *damping), share(*damping));
-            let points: Vec<(Vec<f64>, State)> = dampings.iter().map(moved).collect();
+            let points: Vec<(Vec<f64>, State)> =
+                SPREAD.iter().map(|s| self.moved(&information, &gradient, &held, s * self.damping)).collect();
             let (values, residuals) = self.problem.tried(&points);
             let best = values
                 .iter()
@@ -268,25 +250,25 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
                 .map(|(value, (theta, _))| value + self.prior(theta))
                 .enumerate()
                 .min_by(|a, b| a.1.total_cmp(&b.1));
-            if let Some((k, value)) = best.filter(|(_, value)| *value < self.objective)
-                && let Some((theta, state)) = points.into_iter().nth(k)
-            {
+            if let Some((k, value)) = best.filter(|(_, value)| *value < self.objective) {
+                let Some((theta, state)) = points.into_iter().nth(k) else { return };
                 // A step too small to matter needs no new derivatives.
                 self.fell = 1.0 - value / self.objective;
                 let matters = self.fell > 0.1 * CONVERGED;
                 (self.theta, self.state) = (theta, state);
-                self.damping = dampings[k].max(1e-9);
+                self.damping = (self.damping * SPREAD[k]).max(1e-9);
                 // What is left there has been followed already.
                 let known = residuals.into_iter().map(|part| part.into_iter().nth(k)).collect();
                 self.runs = self.problem.followed_beside(known, &self.theta, &self.state, self.free);
                 self.normal = Normal::new(&self.runs, &self.state);
                 self.temper();
                 self.ended |= !matters;
-                return true;
+                return;
             }
             self.damping *= SPREAD[2] * SPREAD[2];
         }
-        false
+        self.fell = 0.0;
+        self.ended = true;
     }
 
     /// `J'J` and `J'r`, priors of the parameters included.
@@ -315,9 +297,10 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             .collect()
     }
 
-    /// Where this step leads, with so great a share of that of the initial states.
-    fn moved(&self, step: &DVector<f64>, share: f64) -> (Vec<f64>, State) {
+    /// Where a step of this damping leads, initial states and all.
+    fn moved(&self, information: &DMatrix<f64>, gradient: &DVector<f64>, held: &[bool], damping: f64) -> (Vec<f64>, State) {
         let parameters = self.problem.simulator.parameters();
+        let step = damped_step(information, gradient, held, damping);
         let mut theta = self.theta.clone();
         let mut made = DVector::zeros(self.free.len());
         for (i, k) in self.free.iter().enumerate() {
@@ -328,7 +311,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         for (part, values) in state.values.iter_mut().enumerate() {
             let along = &self.normal.initial_by_parameter[part] * &made;
             for ((value, step), along) in values.iter_mut().zip(self.normal.initial_step[part].iter()).zip(along.iter()) {
-                *value += share * step - along;
+                *value += step - along;
             }
         }
         (theta, state)
