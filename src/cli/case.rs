@@ -2,17 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::io::{ControllerEntry, InputError, TwinFile, hint_among};
+use crate::io::{InputError, TwinFile, hint_among};
 use crate::market::{LogReader, check_needs, execution_assembly};
-use crate::report::quantity::number;
 use crate::robot::{
     cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
     tanks_assembly, tanks_recordings,
 };
-use crate::sim2real::diagnose::{Calibration, Comparison, Diagnosis, Excitation, Profile, Verdict, calibrate, diagnose};
+use crate::sim2real::diagnose::{Calibration, Verdict, calibrate, diagnose};
 use crate::sim2real::{Assembly, Parameter, Plant, Recording, Seed, Simulator};
 
+use super::diagnosed::Diagnosed;
 use super::fitted::FittedTwin;
+use super::pace;
 use super::screen::Progress;
 
 /// The models a twin can name.
@@ -20,17 +21,16 @@ const MODELS: [&str; 5] = ["joint", "cart_pole", "tanks", "equations", "executio
 
 /// A twin with its recordings, whatever they are of.
 pub(super) struct Case {
-    file: TwinFile,
     trial: Box<dyn Trial>,
     /// The same with a controller that acts once a row, where the twin has one and does not say how often it acts.
-    paced: Option<(TwinFile, Box<dyn Trial>)>,
+    once_a_row: Option<Box<dyn Trial>>,
 }
 
 /// What can be done with a twin and its recordings.
 trait Trial {
     /// The same, in which the mechanisms of these ids are not known.
     fn without(self: Box<Self>, ids: &[String]) -> Result<Box<dyn Trial>, InputError>;
-    fn diagnose(&self, file: &TwinFile, seed: Seed, progress: &Progress) -> Diagnosed;
+    fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed;
     fn calibrate(&self, seed: Seed, progress: &Progress) -> (Calibration, FittedTwin);
     fn parameters(&self) -> &[Parameter];
     /// The usual time between two rows of the first recording [s].
@@ -38,24 +38,10 @@ trait Trial {
 }
 
 struct Given<P: Plant> {
+    file: TwinFile,
     twin: Assembly<P>,
     recordings: Vec<Recording<P::Stimulus>>,
     held_out: Vec<Recording<P::Stimulus>>,
-}
-
-/// What a diagnosis leaves.
-#[derive(Debug)]
-pub(super) struct Diagnosed {
-    /// The twin as it was taken.
-    pub file: TwinFile,
-    pub diagnosis: Diagnosis,
-    /// The trued twin.
-    pub trued: FittedTwin,
-    pub comparisons: Vec<Comparison>,
-    /// Errors over the states they may depend on.
-    pub profiles: Vec<Profile>,
-    /// The commands of the next experiment, where one was designed.
-    pub excitation: Option<Excitation>,
 }
 
 impl Case {
@@ -66,17 +52,9 @@ impl Case {
     pub fn read(twin: &TwinFile, recordings: &[PathBuf], held_out: &[PathBuf]) -> Result<Self, InputError> {
         check_apart(recordings, held_out)?;
         let trial = trial(twin, recordings, held_out)?;
-        let unsaid = twin.controller.as_ref().filter(|controller| controller.period.is_none());
-        let paced = match unsaid.zip(trial.spacing()) {
-            None => None,
-            Some((controller, period)) => {
-                let mut file = twin.clone();
-                file.controller = Some(ControllerEntry { period: Some(period), ..controller.clone() });
-                let trial = self::trial(&file, recordings, held_out)?;
-                Some((file, trial))
-            }
-        };
-        Ok(Self { file: twin.clone(), trial, paced })
+        let paced = trial.spacing().and_then(|spacing| pace::once_a_row(twin, spacing));
+        let once_a_row = paced.map(|twin| self::trial(&twin, recordings, held_out)).transpose()?;
+        Ok(Self { trial, once_a_row })
     }
 
     /// The same case, in which the mechanisms of these ids are not known.
@@ -84,24 +62,20 @@ impl Case {
     /// # Errors
     /// An id the registry of the twin's plant does not have either.
     pub fn without(self, ids: &[String]) -> Result<Self, InputError> {
-        let paced = match self.paced {
-            None => None,
-            Some((file, trial)) => Some((file, trial.without(ids)?)),
-        };
-        Ok(Self { trial: self.trial.without(ids)?, paced, ..self })
+        let once_a_row = self.once_a_row.map(|trial| trial.without(ids)).transpose()?;
+        Ok(Self { trial: self.trial.without(ids)?, once_a_row })
     }
 
     /// Finds what the twin leaves out. How often its controller acts, where it does not say that, is what explains the recordings
     /// better: at every step, or once a row.
     pub fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
-        let at_every_step = self.trial.diagnose(&self.file, seed, progress);
-        let complete = at_every_step.diagnosis.verdict == Verdict::NoMismatch;
-        let Some((file, trial)) = self.paced.as_ref().filter(|_| !complete) else { return at_every_step };
-        let once_a_row = trial.diagnose(file, seed, progress);
-        if favoured(&once_a_row, &at_every_step) <= DECISIVE {
-            return at_every_step;
+        let at_every_step = self.trial.diagnose(seed, progress);
+        match &self.once_a_row {
+            Some(trial) if at_every_step.diagnosis.verdict != Verdict::NoMismatch => {
+                pace::better(at_every_step, trial.diagnose(seed, progress))
+            }
+            _ => at_every_step,
         }
-        pace_told(once_a_row)
     }
 
     /// Refits the parameters the twin has; gives the twin they make.
@@ -125,11 +99,11 @@ impl<P: Plant> Trial for Given<P> {
         Ok(Box::new(Self { twin: self.twin.excluding(ids), ..*self }))
     }
 
-    fn diagnose(&self, file: &TwinFile, seed: Seed, progress: &Progress) -> Diagnosed {
+    fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
         let tell = |step: &str, done: usize, of: usize| progress.tell(step, done, of);
         let outcome = diagnose(&self.twin, &self.recordings, &self.held_out, seed, &tell);
         Diagnosed {
-            file: file.clone(),
+            file: self.file.clone(),
             trued: FittedTwin::of(&outcome.trued, &outcome.values, &outcome.std, &outcome.correlation),
             diagnosis: outcome.diagnosis,
             comparisons: outcome.comparisons,
@@ -158,49 +132,18 @@ impl<P: Plant> Trial for Given<P> {
     }
 }
 
-/// Evidence above this [twice a log-likelihood] decides how often a controller acts.
-const DECISIVE: f64 = 10.0;
-
-/// By how much the fitted rows favour `a` over `b`, as mechanisms are weighed: residuals by as many of them as are independent, less
-/// what each constant of what was named costs.
-fn favoured(a: &Diagnosed, b: &Diagnosed) -> f64 {
-    let left = |comparison: &Comparison| -> (f64, f64) {
-        let rows = comparison.measured.iter().zip(&comparison.trued);
-        let errors = rows.filter_map(|(measured, trued)| measured.map(|measured| measured - trued));
-        errors.fold((0.0, 0.0), |(squares, rows), error| (squares + error * error, rows + 1.0))
-    };
-    let adequacy = |d: &Diagnosed| d.diagnosis.checks.adequacy.max(1.0);
-    let correlated = adequacy(a).max(adequacy(b));
-    let constants = |d: &Diagnosed| -> f64 { d.diagnosis.effects.iter().map(|e| e.parameters.len() as f64).sum() };
-    let fitted = a.comparisons.iter().zip(&b.comparisons).filter(|(a, _)| !a.held_out);
-    let (gain, rows) = fitted.fold((0.0, 1.0), |(gain, all), (a, b)| {
-        let ((a, rows), (b, _)) = (left(a), left(b));
-        let independent = rows / correlated;
-        (gain + independent * (b / a.max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE).ln(), all + independent)
-    });
-    gain - (constants(a) - constants(b)) * f64::ln(rows)
-}
-
-/// `diagnosed`, which says that it was taken for granted how often the controller acts.
-fn pace_told(mut diagnosed: Diagnosed) -> Diagnosed {
-    let period = diagnosed.file.controller.as_ref().and_then(|controller| controller.period);
-    diagnosed.diagnosis.checks.notes.push(format!(
-        "the twin does not say how often its controller acts: once a row, every {} s, explains these recordings better than at \
-         every step",
-        number(period.unwrap_or_default())
-    ));
-    diagnosed
-}
-
 /// Reads the recordings at `recordings` and `held_out` as `twin` says.
 fn trial(twin: &TwinFile, recordings: &[PathBuf], held_out: &[PathBuf]) -> Result<Box<dyn Trial>, InputError> {
+    let file = twin.clone();
     Ok(match twin.model.as_str() {
         "joint" => Box::new(Given {
+            file,
             twin: joint_assembly(twin)?,
             recordings: joint_recordings(twin, recordings)?,
             held_out: joint_recordings(twin, held_out)?,
         }),
         "cart_pole" => Box::new(Given {
+            file,
             twin: cart_pole_assembly(twin)?,
             recordings: cart_pole_recordings(twin, recordings)?,
             held_out: cart_pole_recordings(twin, held_out)?,
@@ -208,12 +151,12 @@ fn trial(twin: &TwinFile, recordings: &[PathBuf], held_out: &[PathBuf]) -> Resul
         "tanks" => {
             let recordings = tanks_recordings(twin, recordings)?;
             let assembly = tanks_assembly(twin, &recordings)?;
-            Box::new(Given { twin: assembly, recordings, held_out: tanks_recordings(twin, held_out)? })
+            Box::new(Given { file, twin: assembly, recordings, held_out: tanks_recordings(twin, held_out)? })
         }
         "equations" => {
             let recordings = equations_recordings(twin, recordings)?;
             let assembly = equations_assembly(twin, &recordings)?;
-            Box::new(Given { twin: assembly, recordings, held_out: equations_recordings(twin, held_out)? })
+            Box::new(Given { file, twin: assembly, recordings, held_out: equations_recordings(twin, held_out)? })
         }
         "execution" => {
             let assembly = execution_assembly(twin)?;
@@ -222,7 +165,7 @@ fn trial(twin: &TwinFile, recordings: &[PathBuf], held_out: &[PathBuf]) -> Resul
             let (recordings, held_out) = (reader.read_all(recordings)?, reader.read_all(held_out)?);
             check_needs(twin, &recordings)?;
             check_needs(twin, &held_out)?;
-            Box::new(Given { twin: assembly, recordings, held_out })
+            Box::new(Given { file, twin: assembly, recordings, held_out })
         }
         other => {
             let error = twin.error(&["twin", "model"], format!("there is no model `{other}`"));

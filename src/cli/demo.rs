@@ -8,9 +8,10 @@ use crate::conceal::{Content, Set, catalogue};
 use crate::io::{OutputFolder, Overwrite, TwinFile};
 use crate::sim2real::Seed;
 
-use super::case::{Case, Diagnosed};
+use super::case::Case;
 use super::data;
 use super::diagnose::{FILES, effect_names, errors, headline, write};
+use super::diagnosed::Diagnosed;
 use super::screen::{Screen, titled};
 use super::stop::{Outcome, Stop};
 

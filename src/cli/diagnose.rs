@@ -9,7 +9,8 @@ use crate::report::diagnosis_page;
 use crate::sim2real::Seed;
 use crate::sim2real::diagnose::{Diagnosis, EXPERIMENT_FILE, Excitation, Verdict};
 
-use super::case::{Case, Diagnosed};
+use super::case::Case;
+use super::diagnosed::Diagnosed;
 use super::figures::figures;
 use super::screen::{self, Screen};
 use super::stop::{Outcome, Stop};
