@@ -297,7 +297,9 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             .collect()
     }
 
-    /// Where a step of this damping leads, initial states and all.
+    /// Where a step of this damping leads, initial states and all. Their own step, to what is best at these parameters of a linear
+    /// plant, is held back as those of the parameters are: where dry friction, a stop or a pendulum near its top make something else
+    /// of so long a step, no damping of the parameters alone would lead anywhere.
     fn moved(&self, information: &DMatrix<f64>, gradient: &DVector<f64>, held: &[bool], damping: f64) -> (Vec<f64>, State) {
         let parameters = self.problem.simulator.parameters();
         let step = damped_step(information, gradient, held, damping);
@@ -311,7 +313,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         for (part, values) in state.values.iter_mut().enumerate() {
             let along = &self.normal.initial_by_parameter[part] * &made;
             for ((value, step), along) in values.iter_mut().zip(self.normal.initial_step[part].iter()).zip(along.iter()) {
-                *value += step - along;
+                *value += step / (1.0 + damping) - along;
             }
         }
         (theta, state)
