@@ -66,6 +66,7 @@ impl<T: Twin> Kind<T> {
 trait Methods: Simulator<Stimulus = AnyStimulus> {
     fn any(&self) -> &dyn Any;
     fn candidates(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate>;
+    fn of_the_record(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate>;
     fn with(&self, candidate: &Candidate) -> AnyTwin;
     fn stepping(&self, seconds: f64) -> AnyTwin;
     fn quiet(&self) -> AnyTwin;
@@ -183,6 +184,10 @@ impl<T: Twin> Methods for Kind<T> {
 
     fn candidates(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
         self.0.candidates(&self.all(recordings))
+    }
+
+    fn of_the_record(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
+        self.0.of_the_record(&self.all(recordings))
     }
 
     fn with(&self, candidate: &Candidate) -> AnyTwin {
@@ -317,6 +322,10 @@ impl Simulator for AnyTwin {
 impl Twin for AnyTwin {
     fn candidates(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
         self.0.candidates(recordings)
+    }
+
+    fn of_the_record(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
+        self.0.of_the_record(recordings)
     }
 
     fn with(&self, candidate: &Candidate) -> Self {

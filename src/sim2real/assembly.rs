@@ -303,6 +303,37 @@ impl<P: Plant> Assembly<P> {
         Typical { command, effort, ..typical }
     }
 
+    /// The forms of all mechanisms of this `kind` that it does not model, as far as `recordings` can tell of them.
+    fn unmodelled(
+        &self,
+        recordings: &[Recording<P::Stimulus>],
+        kind: impl Fn(&'static dyn Mechanism<P>) -> bool,
+    ) -> Vec<Candidate> {
+        let typical = self.typical(recordings);
+        let modelled = self.modelled();
+        let mut candidates = Vec::new();
+        for mechanism in self.registry.iter().filter(|mechanism| kind(**mechanism)) {
+            let about = mechanism.about();
+            if modelled.contains(&about.name) || self.excluded.iter().any(|id| id == about.name) {
+                continue;
+            }
+            let widest = mechanism.forms(&typical);
+            for (form_index, form) in mechanism.sought(&typical).into_iter().enumerate() {
+                let applies = |stimulus| {
+                    self.plant.concerns(about.site, stimulus) && mechanism.applies(form_index, &self.plant, stimulus)
+                };
+                let known = recordings.iter().all(|r| applies(&r.stimulus));
+                if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
+                    let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
+                    let (ages, seldom) = (mechanism.ages(), mechanism.seldom());
+                    let bounds = bounds(&widest[form_index]);
+                    candidates.push(Candidate { about, form, form_index, finishing, general, ages, seldom, bounds });
+                }
+            }
+        }
+        candidates
+    }
+
     /// Follows `rows`, and gives what is to be `said` of them.
     fn follow(
         &self,
@@ -335,29 +366,11 @@ fn bounds(form: &Form) -> Vec<[f64; 2]> {
 
 impl<P: Plant> Twin for Assembly<P> {
     fn candidates(&self, recordings: &[Recording<P::Stimulus>]) -> Vec<Candidate> {
-        let typical = self.typical(recordings);
-        let modelled = self.modelled();
-        let mut candidates = Vec::new();
-        for mechanism in self.registry {
-            let about = mechanism.about();
-            if modelled.contains(&about.name) || self.excluded.iter().any(|id| id == about.name) {
-                continue;
-            }
-            let widest = mechanism.forms(&typical);
-            for (form_index, form) in mechanism.sought(&typical).into_iter().enumerate() {
-                let applies = |stimulus| {
-                    self.plant.concerns(about.site, stimulus) && mechanism.applies(form_index, &self.plant, stimulus)
-                };
-                let known = recordings.iter().all(|r| applies(&r.stimulus));
-                if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
-                    let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
-                    let (ages, seldom) = (mechanism.ages(), mechanism.seldom());
-                    let bounds = bounds(&widest[form_index]);
-                    candidates.push(Candidate { about, form, form_index, finishing, general, ages, seldom, bounds });
-                }
-            }
-        }
-        candidates
+        self.unmodelled(recordings, |mechanism| !mechanism.of_the_record())
+    }
+
+    fn of_the_record(&self, recordings: &[Recording<P::Stimulus>]) -> Vec<Candidate> {
+        self.unmodelled(recordings, |mechanism| mechanism.of_the_record())
     }
 
     fn with(&self, candidate: &Candidate) -> Self {

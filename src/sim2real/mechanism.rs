@@ -17,6 +17,7 @@ mod observation_delay;
 mod quantization;
 mod rate_limit;
 mod rectification;
+mod sampling_lead;
 mod saturation;
 mod scale;
 mod thermal_derating;
@@ -43,6 +44,7 @@ pub use observation_delay::ObservationDelay;
 pub use quantization::Quantization;
 pub use rate_limit::RateLimit;
 pub use rectification::Rectification;
+pub use sampling_lead::SamplingLead;
 pub use saturation::Saturation;
 pub use scale::Scale;
 pub use thermal_derating::ThermalDerating;
@@ -173,6 +175,11 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     /// Whether its law is met less often by itself than others are: one that leaves out what others of its kind begin with, so that what
     /// these are off by looks like it.
     fn seldom(&self) -> bool {
+        false
+    }
+    /// Whether it is a matter of how a recording was made, and nothing that a simulator leaves out: it is fitted where the recordings ask
+    /// for it, and never named.
+    fn of_the_record(&self) -> bool {
         false
     }
     /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.

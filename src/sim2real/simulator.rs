@@ -138,6 +138,10 @@ pub struct Candidate {
 pub trait Twin: Simulator + Clone + 'static {
     /// The forms of all mechanisms it could be given and does not model yet, as far as `recordings` can tell of them.
     fn candidates(&self, recordings: &[Recording<Self::Stimulus>]) -> Vec<Candidate>;
+    /// The same of mechanisms that are a [matter of the record](super::Mechanism::of_the_record), which are no candidates.
+    fn of_the_record(&self, _recordings: &[Recording<Self::Stimulus>]) -> Vec<Candidate> {
+        Vec::new()
+    }
     /// The twin with one more mechanism, whose parameters follow those it has.
     #[must_use]
     fn with(&self, candidate: &Candidate) -> Self;

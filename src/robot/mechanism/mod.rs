@@ -39,7 +39,7 @@ use super::{CartPole, Equations, Joint, Pendulum, Tanks};
 use crate::sim2real::Registry;
 use crate::sim2real::mechanism::{
     ActuatorLag, Bias, CommandDelay, DeadZone, Drift, Dropout, Eccentricity, GainError, Noise, ObservationDelay,
-    Quantization, RateLimit, Rectification, Saturation, Scale, ThermalDerating,
+    Quantization, RateLimit, Rectification, SamplingLead, Saturation, Scale, ThermalDerating,
 };
 
 /// The rows of a plant's registry: its delays and lags, which of its channels are rates of others, and its own rows. The same generic
@@ -76,6 +76,7 @@ macro_rules! rows {
             &Quantization,
             $($read,)*
             &ObservationDelay { longest: $delays.0, starts: $delays.1, rates: $rates },
+            &SamplingLead { rates: $rates },
             &Dropout,
             &Noise,
         ]

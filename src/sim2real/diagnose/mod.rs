@@ -38,6 +38,7 @@ mod onset;
 mod profile;
 mod prove;
 mod recognize;
+mod record;
 mod remainder;
 mod rested;
 mod rivals;
@@ -220,7 +221,7 @@ fn answered<T: Twin>(
     followed(&AnyTwin::new(twin.clone()), &recordings, &held_out, found, seed, progress).of_its_kind(twin)
 }
 
-/// The same of a twin of any kind.
+/// The same of a twin of any kind: with recordings as they are stamped and, where they ask for it, as they were made.
 fn followed(
     twin: &AnyTwin,
     recordings: &[Recording<AnyStimulus>],
@@ -229,6 +230,21 @@ fn followed(
     seed: Seed,
     progress: Progress<'_>,
 ) -> Answered<AnyTwin> {
+    let (as_stamped, asked_for) = as_stamped(twin, recordings, held_out, found, seed, progress);
+    let Some(candidate) = asked_for else { return as_stamped };
+    let (corrected, _) = self::as_stamped(&twin.with(&candidate), recordings, held_out, found, seed, progress);
+    record::better(as_stamped, corrected, &candidate)
+}
+
+/// The answer where nothing but what the twin models was done to recordings, and what of the record they ask for beside it.
+fn as_stamped(
+    twin: &AnyTwin,
+    recordings: &[Recording<AnyStimulus>],
+    held_out: &[Recording<AnyStimulus>],
+    found: &Found,
+    seed: Seed,
+    progress: Progress<'_>,
+) -> (Answered<AnyTwin>, Option<Candidate>) {
     progress("dividing the recordings", 0, 1);
     let evidence = Evidence::divide(twin, recordings, held_out);
     let candidates = recognize::fixed(twin.candidates(recordings));
@@ -257,6 +273,7 @@ fn followed(
     }
     selection.mark_accepted(&candidates);
     let selection = recognize::finished(&inquiry, selection, &mut rivals);
+    let asked_for = record::asked_for(&inquiry, &selection.selected, recordings);
     progress("proving on held-out data", 0, 1);
     let recalibrated = inquiry.in_free_run(&selection.recalibrated);
     let trued = inquiry.in_free_run(&selection.selected);
@@ -325,7 +342,7 @@ fn followed(
     correlation = correlation.resize(values.len(), values.len(), 0.0);
     (fitted..values.len()).for_each(|k| correlation[(k, k)] = 1.0);
     let outcome = Outcome { diagnosis, trued: trued_twin, values, std, correlation, comparisons, profiles, excitation };
-    Answered { outcome, added, facts }
+    (Answered { outcome, added, facts }, asked_for)
 }
 
 /// The fit with what recordings show by themselves of its parameters. What they leave unexplained is told of the fit: to follow what was
