@@ -77,14 +77,39 @@ pub(super) fn summary(facts: &Facts, verdict: Verdict, effects: &[Effect]) -> St
             shape(facts)
         ),
         Verdict::Unexplained => {
-            let part = match facts.remainder {
-                left if left < 1.0 => format!("takes part of it, {:.0} % of the misfit is left", 100.0 * left),
-                _ => "goes with part of it, and is not what it is".to_owned(),
-            };
+            let part = part_of_it(facts, effects.len() > 1);
             format!("Something is missing from the {name} that no known mechanism explains: {names} {part}{}.", shape(facts))
         }
     }
 }
+
+/// What of something unknown one or `several` names stand for. Where hardly anything of the fitted misfit is left, held-out data speak
+/// against them.
+fn part_of_it(facts: &Facts, several: bool) -> String {
+    let [takes, goes, is] = if several { ["take", "go", "are"] } else { ["takes", "goes", "is"] };
+    if facts.remainder >= 1.0 {
+        return format!("{goes} with part of it, and {is} not what it is");
+    }
+    let left = percent(facts.remainder);
+    let off =
+        facts.fits.iter().find(|fit| facts.remainder < HARDLY_ANYTHING && fit.trued_rmse > STILL_OFF * fit.noise_floor);
+    match off {
+        None => format!("{takes} part of it, {left} of the misfit is left"),
+        Some(fit) => {
+            let [after, noise] = [fit.trued_rmse, fit.noise_floor].map(|e| figure(e, 3));
+            let (channel, unit) = (&fit.channel, &fit.unit);
+            format!(
+                "{takes} part of it, {left} of the misfit is left where it was fitted, and {channel} is off by {after} {unit} where it \
+                 was not (noise floor {noise})"
+            )
+        }
+    }
+}
+
+/// So little of the misfit left is none of the reasons not to believe a name ...
+const HARDLY_ANYTHING: f64 = 0.1;
+/// ... and so many times the noise on held-out data is one.
+const STILL_OFF: f64 = 1.5;
 
 /// By how much the held-out error of a channel falls. A run that leaves all bounds has no error that could be told.
 fn gained(fit: &ChannelFit) -> String {
@@ -210,19 +235,21 @@ mod tests {
             active: Vec::new(),
             moved: Vec::new(),
         };
-        let said = |remainder| {
-            let dependence = Some(Dependence { on: "side", strength: 80.0, explained: 1.0 });
-            let facts = Facts {
-                name: "execution".into(),
-                tried: vec![("permanent_impact", "permanent impact")],
-                fits: vec![fit("cost", "bps", [0.6, 0.6])],
-                few: false,
-                remainder,
-                dependence,
-                contradiction: None,
-            };
-            summary(&facts, Verdict::Unexplained, std::slice::from_ref(&effect))
+        let facts = |remainder| Facts {
+            name: "execution".into(),
+            tried: vec![("permanent_impact", "permanent impact")],
+            fits: vec![fit("cost", "bps", [0.6, 0.6])],
+            few: false,
+            remainder,
+            dependence: Some(Dependence { on: "side", strength: 80.0, explained: 1.0 }),
+            contradiction: None,
         };
+        let said = |remainder| summary(&facts(remainder), Verdict::Unexplained, std::slice::from_ref(&effect));
+        let several = summary(&facts(1e-4), Verdict::Unexplained, &[effect.clone(), effect.clone()]);
+        assert!(
+            several.contains("take part of it, less than 1 % of the misfit is left where it was fitted, and cost is off by"),
+            "{several}"
+        );
         assert!(
             said(0.57).ends_with(
                 "permanent impact takes part of it, 57 % of the misfit is left; what is left depends on the side."
