@@ -46,15 +46,15 @@ use crate::sim2real::mechanism::{
 /// rows stand in each, and Rust has no generic statics: written out, every new mechanism would have to be listed once a
 /// plant.
 macro_rules! rows {
-    // A plant with a coordinate that moves.
-    (motion, delays $delays:expr, lags $lags:expr, rates $rates:expr) => {
+    // A plant with a coordinate that moves, and what else its record may be told by.
+    (motion, delays $delays:expr, lags $lags:expr, rates $rates:expr, record [$($record:expr),*]) => {
         rows!(
             signals, delays $delays, lags $lags, rates $rates,
             plant [
                 &Backlash, &ConstantLoad, &CoulombFriction, &StribeckFriction, &LoadFriction, &QuadraticDrag, &Stiffness,
                 &CubicStiffness, &Cogging, &PayloadChange, &EndStop, &Compliance, &Hysteresis
             ],
-            sensor [&Rectification, &Eccentricity]
+            sensor [&Rectification, &Eccentricity $(, $record)*]
         )
     };
     // Any plant whose commands and observations are signals.
@@ -76,7 +76,6 @@ macro_rules! rows {
             &Quantization,
             $($read,)*
             &ObservationDelay { longest: $delays.0, starts: $delays.1, rates: $rates },
-            &SamplingLead { rates: $rates },
             &Dropout,
             &Noise,
         ]
@@ -98,22 +97,29 @@ const LAGS_OF_SERVOS: Delays = (2.0, &[0.01, 0.05]);
 const LAGS_OF_PROCESSES: Delays = (480.0, &[2.0, 10.0, 40.0]);
 const LAGS_OF_ANYTHING: Delays = (480.0, &[0.01, 0.05, 1.0, 10.0]);
 
+/// Which channels are rates of others: of one coordinate, and of a cart and a pole.
+const OF_ONE: &[(usize, usize)] = &[(0, 1)];
+const OF_TWO: &[(usize, usize)] = &[(0, 1), (2, 3)];
+
 /// The joint's registry.
-pub static MECHANISMS: Registry<Joint> = rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates &[(0, 1)]);
+pub static MECHANISMS: Registry<Joint> =
+    rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates OF_ONE, record [&SamplingLead { rates: OF_ONE }]);
 
 /// The registry of a cart with a pole: mechanisms of motion act on the cart.
 pub static CART_POLE_MECHANISMS: Registry<CartPole> =
-    rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates &[(0, 1), (2, 3)]);
+    rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates OF_TWO, record [&SamplingLead { rates: OF_TWO }]);
 
 /// The registry of a pendulum.
-pub static PENDULUM_MECHANISMS: Registry<Pendulum> = rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates &[(0, 1)]);
+pub static PENDULUM_MECHANISMS: Registry<Pendulum> =
+    rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates OF_ONE, record [&SamplingLead { rates: OF_ONE }]);
 
 /// The registry of two tanks: levels are not below 0, and no encoder turns with them.
 pub static TANKS_MECHANISMS: Registry<Tanks> =
     rows!(signals, delays OF_PROCESSES, lags LAGS_OF_PROCESSES, rates &[], plant [&Overflow], sensor []);
 
 /// The registry of equations, which may be of anything; mechanisms of motion act where the equations say what moves.
-pub static EQUATIONS_MECHANISMS: Registry<Equations> = rows!(motion, delays OF_ANYTHING, lags LAGS_OF_ANYTHING, rates &[]);
+pub static EQUATIONS_MECHANISMS: Registry<Equations> =
+    rows!(motion, delays OF_ANYTHING, lags LAGS_OF_ANYTHING, rates &[], record []);
 
 #[cfg(test)]
 mod tests {

@@ -38,10 +38,6 @@ where
         Form::only(vec![Parameter::new("lead", "s", 0.0).within(0.0, LONGEST).starting_at(&[5e-4])])
     }
 
-    fn applies(&self, _form: usize, _plant: &P, _stimulus: &P::Stimulus) -> bool {
-        !self.rates.is_empty()
-    }
-
     fn of_the_record(&self) -> bool {
         true
     }
