@@ -91,17 +91,18 @@ fn part_of_it(facts: &Facts, several: bool) -> String {
         return format!("{goes} with part of it, and {is} not what it is");
     }
     let left = percent(facts.remainder);
-    let off =
-        facts.fits.iter().find(|fit| facts.remainder < HARDLY_ANYTHING && fit.trued_rmse > STILL_OFF * fit.noise_floor);
+    let away = |fit: &&ChannelFit| !fit.trued_rmse.is_finite() || fit.trued_rmse > STILL_OFF * fit.noise_floor;
+    let off = facts.fits.iter().filter(|_| facts.remainder < HARDLY_ANYTHING).find(away);
     match off {
         None => format!("{takes} part of it, {left} of the misfit is left"),
         Some(fit) => {
             let [after, noise] = [fit.trued_rmse, fit.noise_floor].map(|e| figure(e, 3));
             let (channel, unit) = (&fit.channel, &fit.unit);
-            format!(
-                "{takes} part of it, {left} of the misfit is left where it was fitted, and {channel} is off by {after} {unit} where it \
-                 was not (noise floor {noise})"
-            )
+            let held_out = match fit.trued_rmse.is_finite() {
+                true => format!("{channel} is off by {after} {unit} where it was not (noise floor {noise})"),
+                false => format!("the held-out run of {channel} leaves all bounds"),
+            };
+            format!("{takes} part of it, {left} of the misfit is left where it was fitted, and {held_out}")
         }
     }
 }
@@ -250,6 +251,11 @@ mod tests {
             several.contains("take part of it, less than 1 % of the misfit is left where it was fitted, and cost is off by"),
             "{several}"
         );
+        for away in [f64::INFINITY, f64::NAN] {
+            let facts = Facts { fits: vec![fit("cost", "bps", [0.6, away])], ..facts(1e-4) };
+            let said = summary(&facts, Verdict::Unexplained, std::slice::from_ref(&effect));
+            assert!(said.contains("and the held-out run of cost leaves all bounds"), "{said}");
+        }
         assert!(
             said(0.57).ends_with(
                 "permanent impact takes part of it, 57 % of the misfit is left; what is left depends on the side."
