@@ -118,16 +118,39 @@ pub(super) fn typical<S: AsRef<[f64]>>(recordings: &[Recording<S>], channel: &st
 }
 
 /// Standard deviation of the rounding of a sensor that counts in steps: `step / sqrt(12)` (Widrow & Kollár,
-/// *Quantization Noise* (2008), section 5.4), where nine in ten changes of the signal are whole multiples of the
-/// smallest; 0 elsewhere.
+/// *Quantization Noise* (2008), section 5.4), where nine in ten changes of the signal are whole multiples of one step, but for
+/// the decimals it was written down to; 0 elsewhere.
 pub(super) fn rounding(measured: &Measured) -> f64 {
     let changes = measured.samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
     let largest = changes.clone().fold(0.0, f64::max);
     // Differences of rounded numbers are not quite whole multiples: the last bits differ.
-    let changes: Vec<f64> = changes.filter(|change| *change > 1e-9 * largest).collect();
-    let step = changes.iter().copied().fold(f64::INFINITY, f64::min);
-    let whole = changes.iter().filter(|change| ((**change / step) - (**change / step).round()).abs() < 1e-3).count();
-    if !changes.is_empty() && 10 * whole >= 9 * changes.len() { step / 12.0_f64.sqrt() } else { 0.0 }
+    let mut changes: Vec<f64> = changes.filter(|change| *change > 1e-9 * largest).collect();
+    changes.sort_by(f64::total_cmp);
+    let Some(smallest) = changes.first() else { return 0.0 };
+    let written = last_decimal(measured);
+    let written = if written < COARSE * smallest { written } else { 0.0 };
+    // The smallest changes are known to a decimal alone; what they have in common with larger ones tells the step.
+    let (mut sum, mut steps, mut whole) = (0.0, 0.0, 0);
+    for change in &changes {
+        let step = if steps > 0.0 { sum / steps } else { *smallest };
+        let count = (change / step).round();
+        if (change - count * step).abs() < 1e-3 * step + 1.01 * written {
+            (sum, steps, whole) = (sum + change, steps + count, whole + 1);
+        }
+    }
+    if 10 * whole >= 9 * changes.len() { sum / steps / 12.0_f64.sqrt() } else { 0.0 }
+}
+
+/// What is written down to decimals that are coarser than this part of the smallest change is a multiple of anything.
+const COARSE: f64 = 0.1;
+
+/// The value of the last decimal that the samples were written down to; 0 where they have all their digits.
+fn last_decimal(measured: &Measured) -> f64 {
+    let is_whole = |power: i32| {
+        let parts = measured.samples.iter().flatten().map(|y| y * 10.0_f64.powi(power));
+        parts.into_iter().all(|part| part.abs() < 1e11 && (part - part.round()).abs() < 1e-4)
+    };
+    (0..=9).find(|power| is_whole(*power)).map_or(0.0, |power| 10.0_f64.powi(-power))
 }
 
 /// Root mean square of what is finite; 0 where nothing is.
@@ -158,6 +181,14 @@ mod tests {
         let counted = position(&|t| ((0.05 * (3.1 * t).sin()) / step).round() * step);
         assert!((rounding(&counted) / (step / 12.0_f64.sqrt()) - 1.0).abs() < 1e-6, "{}", rounding(&counted));
         assert_eq!(rounding(&position(&|t| 0.3 * t.sin())), 0.0);
+        // Written down to so many decimals, counts are no whole multiples of their smallest change any more.
+        let fast = |t: f64| ((1.3 * (3.1 * t).sin() + 0.4 * (7.7 * t).cos()) / step).round() * step;
+        for decimals in [1e4, 1e5, 1e6, 1e7] {
+            let written = rounding(&position(&|t| (fast(t) * decimals).round() / decimals));
+            assert!((written / (step / 12.0_f64.sqrt()) - 1.0).abs() < 1e-3, "{decimals}: {written}");
+        }
+        let noisy = |t: f64| ((0.3 * t.sin() + 1e-3 * (7919.0 * t).sin()) * 1e6).round() / 1e6;
+        assert!(rounding(&position(&noisy)) < 1e-6);
     }
 
     #[test]

@@ -322,7 +322,9 @@ impl<P: Plant> Assembly<P> {
                 let applies = |stimulus| {
                     self.plant.concerns(about.site, stimulus) && mechanism.applies(form_index, &self.plant, stimulus)
                 };
-                let known = recordings.iter().all(|r| applies(&r.stimulus));
+                let told = |channel: usize| measured(recordings, self.channels().get(channel));
+                let known =
+                    recordings.iter().all(|r| applies(&r.stimulus)) && mechanism.told_by(form_index).is_none_or(told);
                 if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
                     let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
                     let (ages, seldom) = (mechanism.ages(), mechanism.seldom());
@@ -357,6 +359,13 @@ impl<P: Plant> Assembly<P> {
         }
         out.trajectories()
     }
+}
+
+/// Whether any of the recordings has samples of the channel.
+fn measured<S>(recordings: &[Recording<S>], channel: Option<&Channel>) -> bool {
+    let own =
+        |r: &Recording<S>| channel.and_then(|c| r.channel(&c.name)).is_some_and(|m| m.samples.iter().any(Option::is_some));
+    recordings.iter().any(own)
 }
 
 /// Lowest and highest value of each parameter of `form`.

@@ -14,6 +14,7 @@ mod eccentricity;
 mod gain_error;
 mod noise;
 mod observation_delay;
+mod of_readings;
 mod quantization;
 mod rate_limit;
 mod rectification;
@@ -21,6 +22,7 @@ mod sampling_lead;
 mod saturation;
 mod scale;
 mod thermal_derating;
+mod velocity_filter;
 #[cfg(test)]
 mod wire;
 
@@ -41,6 +43,7 @@ pub use eccentricity::Eccentricity;
 pub use gain_error::GainError;
 pub use noise::Noise;
 pub use observation_delay::ObservationDelay;
+pub use of_readings::rate_of_the_first;
 pub use quantization::Quantization;
 pub use rate_limit::RateLimit;
 pub use rectification::Rectification;
@@ -48,6 +51,7 @@ pub use sampling_lead::SamplingLead;
 pub use saturation::Saturation;
 pub use scale::Scale;
 pub use thermal_derating::ThermalDerating;
+pub use velocity_filter::VelocityFilter;
 
 /// Where a mechanism acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -181,6 +185,10 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     /// for it, and never named.
     fn of_the_record(&self) -> bool {
         false
+    }
+    /// The channel by which alone form `form` tells itself from a plainer one, so that recordings without it cannot tell of it.
+    fn told_by(&self, _form: usize) -> Option<usize> {
+        None
     }
     /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.
     fn recognized(&self, _form: usize, _signs: &Signs) -> Option<Vec<f64>> {

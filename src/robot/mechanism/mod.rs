@@ -39,22 +39,33 @@ use super::{CartPole, Equations, Joint, Pendulum, Tanks};
 use crate::sim2real::Registry;
 use crate::sim2real::mechanism::{
     ActuatorLag, Bias, CommandDelay, DeadZone, Drift, Dropout, Eccentricity, GainError, Noise, ObservationDelay,
-    Quantization, RateLimit, Rectification, SamplingLead, Saturation, Scale, ThermalDerating,
+    Quantization, RateLimit, Rectification, SamplingLead, Saturation, Scale, ThermalDerating, VelocityFilter,
+    rate_of_the_first,
 };
 
 /// The rows of a plant's registry: its delays and lags, which of its channels are rates of others, and its own rows. The same generic
 /// rows stand in each, and Rust has no generic statics: written out, every new mechanism would have to be listed once a
 /// plant.
 macro_rules! rows {
-    // A plant with a coordinate that moves, and what else its record may be told by.
-    (motion, delays $delays:expr, lags $lags:expr, rates $rates:expr, record [$($record:expr),*]) => {
+    // A plant that is sampled by the millisecond, and has rates.
+    (servo, rates $rates:expr) => {
+        rows!(
+            motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates $rates,
+            of_rates [&SamplingLead { rates: $rates }, &VelocityFilter { rates: $rates }]
+        )
+    };
+    // A plant with a coordinate that moves, and what there is of its rates alone.
+    (motion, delays $delays:expr, lags $lags:expr, rates $rates:expr, of_rates [$($of_rates:expr),*]) => {
         rows!(
             signals, delays $delays, lags $lags, rates $rates,
             plant [
                 &Backlash, &ConstantLoad, &CoulombFriction, &StribeckFriction, &LoadFriction, &QuadraticDrag, &Stiffness,
                 &CubicStiffness, &Cogging, &PayloadChange, &EndStop, &Compliance, &Hysteresis
             ],
-            sensor [&Rectification, &Eccentricity $(, $record)*]
+            sensor [
+                &Rectification { rate: rate_of_the_first($rates) }, &Eccentricity { rate: rate_of_the_first($rates) }
+                $(, $of_rates)*
+            ]
         )
     };
     // Any plant whose commands and observations are signals.
@@ -71,8 +82,8 @@ macro_rules! rows {
             &GainError,
             $($own,)*
             &Bias,
-            &Drift,
-            &Scale,
+            &Drift { rate: rate_of_the_first($rates) },
+            &Scale { rate: rate_of_the_first($rates) },
             &Quantization,
             $($read,)*
             &ObservationDelay { longest: $delays.0, starts: $delays.1, rates: $rates },
@@ -102,16 +113,13 @@ const OF_ONE: &[(usize, usize)] = &[(0, 1)];
 const OF_TWO: &[(usize, usize)] = &[(0, 1), (2, 3)];
 
 /// The joint's registry.
-pub static MECHANISMS: Registry<Joint> =
-    rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates OF_ONE, record [&SamplingLead { rates: OF_ONE }]);
+pub static MECHANISMS: Registry<Joint> = rows!(servo, rates OF_ONE);
 
 /// The registry of a cart with a pole: mechanisms of motion act on the cart.
-pub static CART_POLE_MECHANISMS: Registry<CartPole> =
-    rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates OF_TWO, record [&SamplingLead { rates: OF_TWO }]);
+pub static CART_POLE_MECHANISMS: Registry<CartPole> = rows!(servo, rates OF_TWO);
 
 /// The registry of a pendulum.
-pub static PENDULUM_MECHANISMS: Registry<Pendulum> =
-    rows!(motion, delays OF_SERVOS, lags LAGS_OF_SERVOS, rates OF_ONE, record [&SamplingLead { rates: OF_ONE }]);
+pub static PENDULUM_MECHANISMS: Registry<Pendulum> = rows!(servo, rates OF_ONE);
 
 /// The registry of two tanks: levels are not below 0, and no encoder turns with them.
 pub static TANKS_MECHANISMS: Registry<Tanks> =
@@ -119,7 +127,7 @@ pub static TANKS_MECHANISMS: Registry<Tanks> =
 
 /// The registry of equations, which may be of anything; mechanisms of motion act where the equations say what moves.
 pub static EQUATIONS_MECHANISMS: Registry<Equations> =
-    rows!(motion, delays OF_ANYTHING, lags LAGS_OF_ANYTHING, rates &[], record []);
+    rows!(motion, delays OF_ANYTHING, lags LAGS_OF_ANYTHING, rates &[], of_rates []);
 
 #[cfg(test)]
 mod tests {
@@ -146,7 +154,8 @@ mod tests {
 
     #[test]
     fn only_what_turns_can_be_eccentric() {
-        let applies = |axis| Eccentricity.applies(0, &Joint::new(axis, [1.0; 4], [0.0; 4]), &Commands::default());
+        let disc = Eccentricity { rate: None };
+        let applies = |axis| disc.applies(0, &Joint::new(axis, [1.0; 4], [0.0; 4]), &Commands::default());
         assert!(applies(Axis::Rotary) && !applies(Axis::Linear));
     }
 

@@ -1,17 +1,24 @@
 //! A sensor whose disc does not run true.
 
+use super::of_readings::of_readings;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y -> y + sine sin(y) + cosine cos(y)`, on the plant's first channel, an angle: a disc off its axis is wrong once a turn. In the
 /// form `two_harmonics`, also `second_sine sin(2 y) + second_cosine cos(2 y)`: a disc that is oval or tilted, or a ring magnet
 /// whose two tracks differ in size, is wrong twice.
 ///
+/// In forms `.._with_rate` the first channel's rate of change is told from the same readings, as a drive tells a speed from its
+/// encoder, and is wrong with them. In the others it has a sensor of its own.
+///
 /// An amplitude and a phase, written as a sine and a cosine: that is linear, and has no phase to lose where the amplitude
 /// is small.
 ///
 /// Source: Sanchez-Brea & Morlanes, "Metrological errors in optical encoders", Measurement Science and Technology 19 (2008).
 #[derive(Debug, Clone, Copy)]
-pub struct Eccentricity;
+pub struct Eccentricity {
+    /// The channel that is the first one's rate of change, where there is one.
+    pub rate: Option<usize>,
+}
 
 impl<P: Plant> Mechanism<P> for Eccentricity
 where
@@ -22,7 +29,7 @@ where
             name: "eccentricity",
             site: Site::Observation,
             title: "an eccentric sensor",
-            law: "y -> y + sine sin(y) + cosine cos(y); two_harmonics: and the same of 2 y",
+            law: "y -> y + sine sin(y) + cosine cos(y); two_harmonics: and the same of 2 y; with_rate: and dy/dt of that",
             source: "Sanchez-Brea & Morlanes, Metrological errors in optical encoders, Meas. Sci. Technol. 19 (2008)",
             remedy: "centre the disc, read it on two sides, or correct readings by a table over a turn",
             contains: &[],
@@ -32,13 +39,25 @@ where
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         // What matters is in proportion to the motion, and no disc in use is off by more than some hundredths of a turn.
         let start = (0.03 * typical.output).min(0.02);
-        let wave =
-            |name, starts: &[f64]| Parameter::new(name, "output", 0.0).within(-0.5, 0.5).starting_at(starts).proportional();
-        let first = vec![wave("sine", &[start, -start]), wave("cosine", &[start, -start])];
         // A fit finds the sign of what is linear: the second pair needs a slope to begin with, not both signs.
-        let second = [wave("second_sine", &[0.3 * start]), wave("second_cosine", &[0.3 * start])];
-        let both = first.iter().cloned().chain(second).collect();
-        vec![Form { name: "one_harmonic", parameters: first }, Form { name: "two_harmonics", parameters: both }]
+        let starts: [&[f64]; 4] = [&[start, -start], &[start, -start], &[0.3 * start], &[0.3 * start]];
+        let waves = |names: &[&'static str]| -> Vec<Parameter> {
+            let wave = |name| Parameter::new(name, "output", 0.0).within(-0.5, 0.5).proportional();
+            names.iter().zip(starts).map(|(name, starts)| wave(*name).starting_at(starts)).collect()
+        };
+        let mut forms = vec![
+            Form { name: "one_harmonic", parameters: waves(&NAMES[..2]) },
+            Form { name: "two_harmonics", parameters: waves(&NAMES) },
+        ];
+        if self.rate.is_some() {
+            forms.push(Form { name: "one_harmonic_with_rate", parameters: waves(&NAMES_WITH_RATE[..2]) });
+            forms.push(Form { name: "two_harmonics_with_rate", parameters: waves(&NAMES_WITH_RATE) });
+        }
+        forms
+    }
+
+    fn told_by(&self, form: usize) -> Option<usize> {
+        self.rate.filter(|_| form >= 2)
     }
 
     /// A turn is a turn of an angle.
@@ -48,16 +67,21 @@ where
 
     /// Over less than a turn two harmonics may be bent into whatever else a sensor does.
     fn general(&self, form: usize) -> bool {
-        form == 1
+        form % 2 == 1
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let waves = (0..thetas.lanes())
             .map(|lane| std::array::from_fn(|k| if k < thetas.parameters() { thetas.row(k)[lane] } else { 0.0 }))
             .collect();
-        Box::new(Waves(waves))
+        of_readings(Box::new(Waves(waves)), Mechanism::<P>::told_by(self, form))
     }
 }
+
+/// Sine and cosine of one turn, then of half a turn.
+const NAMES: [&str; 4] = ["sine", "cosine", "second_sine", "second_cosine"];
+const NAMES_WITH_RATE: [&str; 4] =
+    ["sine_with_rate", "cosine_with_rate", "second_sine_with_rate", "second_cosine_with_rate"];
 
 /// Sine and cosine of the first harmonic, then of the second, one set a lane.
 #[derive(Clone)]
@@ -94,8 +118,9 @@ mod tests {
         let (second, second_phase) = (0.01, -1.9_f64);
         let first = [amplitude * phase.cos(), amplitude * phase.sin()];
         let both = [first[0], first[1], second * second_phase.cos(), second * second_phase.sin()];
-        let once = &sensed(&Eccentricity, 0, &[&first], 1, &rows)[0];
-        let twice = &sensed(&Eccentricity, 1, &[&both], 1, &rows)[0];
+        let disc = Eccentricity { rate: None };
+        let once = &sensed(&disc, 0, &[&first], 1, &rows)[0];
+        let twice = &sensed(&disc, 1, &[&both], 1, &rows)[0];
         for (i, (_, [y, _])) in rows.iter().enumerate() {
             let expected = y + amplitude * (y + phase).sin();
             assert!((once[i][0] - expected).abs() < 1e-13);

@@ -79,7 +79,7 @@ where
 
 /// The past of one lane, as far back as its delay reaches.
 #[derive(Clone)]
-struct Line<O> {
+pub(super) struct Line<O> {
     /// Rows (time [s], observation), oldest first.
     past: VecDeque<(f64, O)>,
     /// Rows that have left the line, to be written over: a delay that is under way takes no more memory.
@@ -93,7 +93,8 @@ impl<O> Default for Line<O> {
 }
 
 impl<O: Observation + AsMut<[f64]>> Line<O> {
-    fn pass(&mut self, time: f64, seconds: f64, observation: &mut O, rates: &[(usize, usize)]) {
+    /// Puts what is reported `seconds` late in the place of what is observed.
+    pub(super) fn pass(&mut self, time: f64, seconds: f64, observation: &mut O, rates: &[(usize, usize)]) {
         let from = time - seconds;
         while !self.past.is_empty() && self.past.get(1).map_or(time, |(next, _)| *next) <= from {
             self.left.extend(self.past.pop_front().map(|(_, row)| row));

@@ -1,13 +1,20 @@
 //! A sensor that reads too much or too little, in proportion.
 
+use super::of_readings::of_readings;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Typical};
 
 /// `y -> (1 + error) y`, on the plant's first channel: a wrong count of pulses per turn, of teeth, or of volts; in the form
 /// `bent`, `y -> (1 + bent_error + bow y^2) y`, as of a potentiometer, which is not quite straight either.
 ///
+/// In forms `.._with_rate` the first channel's rate of change is told from the same readings, as a drive tells a speed from its
+/// encoder, and is wrong with them. In the others it has a sensor of its own.
+///
 /// Source: scale factor error and scale factor nonlinearity, IEEE Std 528-2019, *Inertial Sensor Terminology*.
 #[derive(Debug, Clone, Copy)]
-pub struct Scale;
+pub struct Scale {
+    /// The channel that is the first one's rate of change, where there is one.
+    pub rate: Option<usize>,
+}
 
 impl<P: Plant> Mechanism<P> for Scale
 where
@@ -18,7 +25,7 @@ where
             name: "scale",
             site: Site::Observation,
             title: "a wrong scale of the sensor",
-            law: "y -> (1 + error) y; bent: y -> (1 + bent_error + bow y^2) y",
+            law: "y -> (1 + error) y; bent: y -> (1 + bent_error + bow y^2) y; with_rate: and dy/dt of that",
             source: "scale factor error, IEEE Std 528-2019, Inertial Sensor Terminology",
             remedy: "move the axis over a known distance; correct the factor from counts to units",
             contains: &[],
@@ -29,16 +36,30 @@ where
         // A factor that turns the sign or hides the motion altogether is another fault than this.
         let error = |name| Parameter::new(name, "", 0.0).within(-0.95, 10.0).starting_at(&[0.05, -0.05]).proportional();
         let bows = [0.02, -0.02].map(|part| part / (typical.output * typical.output).max(1e-12));
-        let bow = Parameter::new("bow", "1/output^2", 0.0).starting_at(&bows).proportional();
-        vec![
+        let bow = |name| Parameter::new(name, "1/output^2", 0.0).starting_at(&bows).proportional();
+        let mut forms = vec![
             Form { name: "straight", parameters: vec![error("error")] },
-            Form { name: "bent", parameters: vec![error("bent_error"), bow] },
-        ]
+            Form { name: "bent", parameters: vec![error("bent_error"), bow("bow")] },
+        ];
+        if self.rate.is_some() {
+            forms.push(Form { name: "straight_with_rate", parameters: vec![error("error_with_rate")] });
+            let bent = vec![error("bent_error_with_rate"), bow("bow_with_rate")];
+            forms.push(Form { name: "bent_with_rate", parameters: bent });
+        }
+        forms
+    }
+
+    fn told_by(&self, form: usize) -> Option<usize> {
+        self.rate.filter(|_| form >= 2)
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let factor = thetas.row(0).iter().map(|error| 1.0 + error).collect();
-        if form == 0 { Box::new(Factor(factor)) } else { Box::new(BentFactor { factor, bow: thetas.row(1).to_vec() }) }
+        let law: Box<dyn Law<P>> = match form % 2 {
+            0 => Box::new(Factor(factor)),
+            _ => Box::new(BentFactor { factor, bow: thetas.row(1).to_vec() }),
+        };
+        of_readings(law, Mechanism::<P>::told_by(self, form))
     }
 }
 
@@ -94,10 +115,10 @@ mod tests {
     #[test]
     fn readings_are_in_proportion_and_the_other_channel_is_left_alone() {
         let rows = [(0.0, [-2.0, 1.0]), (1.0, [0.0, 1.0]), (2.0, [4.0, 1.0])];
-        let out = sensed(&Scale, 0, &[&[0.25], &[-0.5]], 1, &rows);
+        let out = sensed(&Scale { rate: None }, 0, &[&[0.25], &[-0.5]], 1, &rows);
         assert_eq!(out[0], [[-2.5, 1.0], [0.0, 1.0], [5.0, 1.0]]);
         assert_eq!(out[1], [[-1.0, 1.0], [0.0, 1.0], [2.0, 1.0]]);
-        let bent = sensed(&Scale, 1, &[&[0.25, 0.5]], 1, &rows);
+        let bent = sensed(&Scale { rate: None }, 1, &[&[0.25, 0.5]], 1, &rows);
         assert_eq!(bent[0], [[-6.5, 1.0], [0.0, 1.0], [37.0, 1.0]]);
     }
 }

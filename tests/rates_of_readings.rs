@@ -1,0 +1,101 @@
+//! A drive that tells its speed from its encoder tells it with the encoder's faults; a tachometer beside the encoder has none of them.
+
+#![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
+
+use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
+use trueup::sim2real::diagnose::{Outcome, Verdict, diagnose};
+use trueup::sim2real::{Assembly, Measured, Recording, Seed};
+
+/// Inertia [kg m^2], viscous friction [N m s/rad] and torque of gravity [N m] of the arm.
+const ARM: [f64; 3] = [0.096, 0.25, 2.35];
+/// What rows are apart [s].
+const SPACING: f64 = 4e-3;
+
+/// What an encoder reads at an angle, and by how much its readings change with that.
+type Encoder = fn(f64) -> [f64; 2];
+
+fn too_long(y: f64) -> [f64; 2] {
+    [1.01 * y, 1.01]
+}
+
+fn off_its_axis(y: f64) -> [f64; 2] {
+    let y_and_phase: f64 = y + 0.6;
+    [y + 0.01 * y_and_phase.sin(), 1.0 + 0.01 * y_and_phase.cos()]
+}
+
+/// An arm read by `encoder`, by the fourth-order method of Runge and Kutta, and its speed: from the encoder or from a tachometer.
+fn recorded(name: &str, encoder: Encoder, tachometer: bool, salt: u64) -> Recording<Commands> {
+    let mut drawn = salt;
+    let mut chance = move || {
+        drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        2.0 * ((drawn >> 11) as f64 / (1_u64 << 53) as f64) - 1.0
+    };
+    let waves: Vec<[f64; 3]> = (1..8).map(|k| [0.5, 0.3 * f64::from(k) + 0.1 * chance(), 3.0 * chance()]).collect();
+    let (mut q, mut v, mut held) = (0.0_f64, 0.0_f64, 0.0);
+    let (mut commands, mut position, mut velocity) = (Vec::new(), Vec::new(), Vec::new());
+    let time: Vec<f64> = (0..3_000).map(|row| SPACING * f64::from(row)).collect();
+    for (row, t) in time.iter().enumerate() {
+        held = if row % 250 == 0 { chance() } else { held };
+        let command = held + waves.iter().map(|[height, rate, phase]| height * (6.0 * rate * t + phase).sin()).sum::<f64>();
+        let [read, slope] = encoder(q);
+        commands.push(command);
+        position.push(Some(read + 8.7e-4 * chance()));
+        velocity.push(Some(if tachometer { v } else { slope * v } + 1.7e-2 * chance()));
+        let [inertia, viscous, gravity] = ARM;
+        let slope = |q: f64, v: f64| [v, (command - viscous * v - gravity * q.sin()) / inertia];
+        let h = 0.25 * SPACING;
+        for _ in 0..4 {
+            let a = slope(q, v);
+            let b = slope(q + 0.5 * h * a[0], v + 0.5 * h * a[1]);
+            let c = slope(q + 0.5 * h * b[0], v + 0.5 * h * b[1]);
+            let d = slope(q + h * c[0], v + h * c[1]);
+            q += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]);
+            v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]);
+        }
+    }
+    let channel = |channel: &str, unit: &str, samples| Measured { channel: channel.into(), unit: unit.into(), samples };
+    let measured = vec![channel("position", "rad", position), channel("velocity", "rad/s", velocity)];
+    Recording { name: name.into(), time, stimulus: Commands(commands), measured }
+}
+
+fn diagnosed(encoder: Encoder, tachometer: bool) -> Outcome<Assembly<Joint>> {
+    let nominal = [0.11, 0.22, 2.6, 1.0];
+    let twin = Assembly::new(Joint::new(Axis::Rotary, nominal, [0.2, 0.2, 0.2, 0.0]), MECHANISMS);
+    let [train, test] = [("train", 1), ("test", 2)].map(|(name, salt)| recorded(name, encoder, tachometer, salt));
+    diagnose(&twin, &[train], &[test], Seed(0), &|_, _, _| {})
+}
+
+/// The values of the only effect named, which is `mechanism`.
+fn named(outcome: &Outcome<Assembly<Joint>>, mechanism: &str) -> Vec<(String, f64)> {
+    let found = &outcome.diagnosis;
+    assert_eq!(found.verdict, Verdict::Named, "{}", found.summary);
+    assert_eq!(found.effects.len(), 1, "{}", found.summary);
+    assert_eq!(found.effects[0].mechanism, mechanism, "{}", found.summary);
+    found.effects[0].parameters.iter().map(|(name, value)| (name.clone(), value.value)).collect()
+}
+
+#[test]
+fn a_speed_from_an_encoder_that_counts_too_much_is_too_high() {
+    let values = named(&diagnosed(too_long, false), "scale");
+    assert!(
+        matches!(&values[..], [(name, error)] if name == "error_with_rate" && (error - 0.01).abs() < 5e-4),
+        "{values:?}"
+    );
+}
+
+#[test]
+fn a_speed_from_an_eccentric_encoder_swings() {
+    let values = named(&diagnosed(off_its_axis, false), "eccentricity");
+    let off = [("cosine_with_rate", 0.6_f64.sin()), ("sine_with_rate", 0.6_f64.cos())];
+    for ((name, value), (own, part)) in values.iter().zip(off) {
+        assert!(name == own && (value - 0.01 * part).abs() < 5e-4, "{values:?}");
+    }
+}
+
+#[test]
+fn a_tachometer_beside_it_is_right() {
+    for (encoder, mechanism) in [(too_long as Encoder, "scale"), (off_its_axis, "eccentricity")] {
+        let values = named(&diagnosed(encoder, true), mechanism);
+        assert!(values.iter().all(|(name, _)| !name.ends_with("_with_rate")), "{values:?}");
+    }
+}
