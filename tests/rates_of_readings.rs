@@ -1,4 +1,5 @@
-//! A drive that tells its speed from its encoder tells it with the encoder's faults; a tachometer beside the encoder has none of them.
+//! A drive that tells its speed from its encoder tells it with the encoder's faults, and late; a tachometer beside the encoder does
+//! neither.
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
@@ -23,15 +24,29 @@ fn off_its_axis(y: f64) -> [f64; 2] {
     [y + 0.01 * y_and_phase.sin(), 1.0 + 0.01 * y_and_phase.cos()]
 }
 
-/// An arm read by `encoder`, by the fourth-order method of Runge and Kutta, and its speed: from the encoder or from a tachometer.
-fn recorded(name: &str, encoder: Encoder, tachometer: bool, salt: u64) -> Recording<Commands> {
+fn true_to_it(y: f64) -> [f64; 2] {
+    [y, 1.0]
+}
+
+/// Where a speed comes from.
+#[derive(Clone, Copy, PartialEq)]
+enum Speed {
+    Tachometer,
+    /// The rate of what the encoder reads.
+    Readings,
+    /// Differences of what the encoder reads, through a filter of that time constant [s].
+    Filtered(f64),
+}
+
+/// An arm read by `encoder`, by the fourth-order method of Runge and Kutta, and its speed.
+fn recorded(name: &str, encoder: Encoder, speed: Speed, salt: u64) -> Recording<Commands> {
     let mut drawn = salt;
     let mut chance = move || {
         drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         2.0 * ((drawn >> 11) as f64 / (1_u64 << 53) as f64) - 1.0
     };
     let waves: Vec<[f64; 3]> = (1..8).map(|k| [0.5, 0.3 * f64::from(k) + 0.1 * chance(), 3.0 * chance()]).collect();
-    let (mut q, mut v, mut held) = (0.0_f64, 0.0_f64, 0.0);
+    let (mut q, mut v, mut held, mut filtered) = (0.0_f64, 0.0_f64, 0.0, 0.0);
     let (mut commands, mut position, mut velocity) = (Vec::new(), Vec::new(), Vec::new());
     let time: Vec<f64> = (0..3_000).map(|row| SPACING * f64::from(row)).collect();
     for (row, t) in time.iter().enumerate() {
@@ -39,8 +54,19 @@ fn recorded(name: &str, encoder: Encoder, tachometer: bool, salt: u64) -> Record
         let command = held + waves.iter().map(|[height, rate, phase]| height * (6.0 * rate * t + phase).sin()).sum::<f64>();
         let [read, slope] = encoder(q);
         commands.push(command);
-        position.push(Some(read + 8.7e-4 * chance()));
-        velocity.push(Some(if tachometer { v } else { slope * v } + 1.7e-2 * chance()));
+        let read = read + 8.7e-4 * chance();
+        filtered = match (speed, position.last()) {
+            (Speed::Filtered(time), Some(Some(last))) => {
+                filtered + (1.0 - f64::exp(-SPACING / time)) * ((read - last) / SPACING - filtered)
+            }
+            _ => filtered,
+        };
+        position.push(Some(read));
+        velocity.push(Some(match speed {
+            Speed::Tachometer => v + 1.7e-2 * chance(),
+            Speed::Readings => slope * v + 1.7e-2 * chance(),
+            Speed::Filtered(_) => filtered,
+        }));
         let [inertia, viscous, gravity] = ARM;
         let slope = |q: f64, v: f64| [v, (command - viscous * v - gravity * q.sin()) / inertia];
         let h = 0.25 * SPACING;
@@ -58,10 +84,10 @@ fn recorded(name: &str, encoder: Encoder, tachometer: bool, salt: u64) -> Record
     Recording { name: name.into(), time, stimulus: Commands(commands), measured }
 }
 
-fn diagnosed(encoder: Encoder, tachometer: bool) -> Outcome<Assembly<Joint>> {
+fn diagnosed(encoder: Encoder, speed: Speed) -> Outcome<Assembly<Joint>> {
     let nominal = [0.11, 0.22, 2.6, 1.0];
     let twin = Assembly::new(Joint::new(Axis::Rotary, nominal, [0.2, 0.2, 0.2, 0.0]), MECHANISMS);
-    let [train, test] = [("train", 1), ("test", 2)].map(|(name, salt)| recorded(name, encoder, tachometer, salt));
+    let [train, test] = [("train", 1), ("test", 2)].map(|(name, salt)| recorded(name, encoder, speed, salt));
     diagnose(&twin, &[train], &[test], Seed(0), &|_, _, _| {})
 }
 
@@ -76,7 +102,7 @@ fn named(outcome: &Outcome<Assembly<Joint>>, mechanism: &str) -> Vec<(String, f6
 
 #[test]
 fn a_speed_from_an_encoder_that_counts_too_much_is_too_high() {
-    let values = named(&diagnosed(too_long, false), "scale");
+    let values = named(&diagnosed(too_long, Speed::Readings), "scale");
     assert!(
         matches!(&values[..], [(name, error)] if name == "error_with_rate" && (error - 0.01).abs() < 5e-4),
         "{values:?}"
@@ -85,7 +111,7 @@ fn a_speed_from_an_encoder_that_counts_too_much_is_too_high() {
 
 #[test]
 fn a_speed_from_an_eccentric_encoder_swings() {
-    let values = named(&diagnosed(off_its_axis, false), "eccentricity");
+    let values = named(&diagnosed(off_its_axis, Speed::Readings), "eccentricity");
     let off = [("cosine_with_rate", 0.6_f64.sin()), ("sine_with_rate", 0.6_f64.cos())];
     for ((name, value), (own, part)) in values.iter().zip(off) {
         assert!(name == own && (value - 0.01 * part).abs() < 5e-4, "{values:?}");
@@ -95,7 +121,14 @@ fn a_speed_from_an_eccentric_encoder_swings() {
 #[test]
 fn a_tachometer_beside_it_is_right() {
     for (encoder, mechanism) in [(too_long as Encoder, "scale"), (off_its_axis, "eccentricity")] {
-        let values = named(&diagnosed(encoder, true), mechanism);
+        let values = named(&diagnosed(encoder, Speed::Tachometer), mechanism);
         assert!(values.iter().all(|(name, _)| !name.ends_with("_with_rate")), "{values:?}");
     }
+}
+
+#[test]
+fn a_filtered_speed_is_late() {
+    let values = named(&diagnosed(true_to_it, Speed::Filtered(0.01)), "velocity_filter");
+    // A difference is late by half of what rows are apart; this filter holds what it is given until the next row, and is early by as much.
+    assert!(matches!(&values[..], [(name, time)] if name == "time_constant" && (time - 0.01).abs() < 5e-4), "{values:?}");
 }

@@ -60,12 +60,29 @@ pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row:
     let solution = inverse * right;
     let spare = (points.len() - 3) as f64;
     let variance = points.iter().map(|(t, y)| (y - powers(*t).dot(&solution)).powi(2)).sum::<f64>() / spare;
+    // Samples that repeat each other are rounded alike: they tell no more than as many as the parabola has coefficients.
+    let rounded = step_seen(samples, row).powi(2) / 12.0 * points.len() as f64 / 3.0;
     let measured = recording.channel(rate).and_then(|v| v.samples[row]);
     Some(Estimate {
         value: solution[0],
         rate: measured.unwrap_or(solution[1] / scale),
-        rate_std: (variance * inverse[(1, 1)]).sqrt() / scale,
+        rate_std: ((variance + rounded) * inverse[(1, 1)]).sqrt() / scale,
     })
+}
+
+/// The step in which samples about `row` are counted, where some of them repeat each other: the smallest of their changes, or the next
+/// one where they do not change at all. 0 where none repeats another, and where nothing ever changes.
+fn step_seen(samples: &[Option<f64>], row: usize) -> f64 {
+    let changes = |rows: std::ops::Range<usize>| {
+        let pairs = samples[rows].windows(2);
+        pairs.filter_map(|w| Some((w[1]? - w[0]?).abs()))
+    };
+    let around = |reach: usize| row.saturating_sub(reach)..(row + reach + 1).min(samples.len());
+    if !changes(around(REACH)).any(|change| change == 0.0) {
+        return 0.0;
+    }
+    let smallest = |reach| changes(around(reach)).filter(|change| *change > 0.0).min_by(f64::total_cmp);
+    smallest(REACH).or_else(|| smallest(FARTHEST)).unwrap_or(0.0)
 }
 
 /// Whether so many samples, at times from the row in question, tell of it.

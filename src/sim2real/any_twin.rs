@@ -70,6 +70,7 @@ trait Methods: Simulator<Stimulus = AnyStimulus> {
     fn with(&self, candidate: &Candidate) -> AnyTwin;
     fn stepping(&self, seconds: f64) -> AnyTwin;
     fn quiet(&self) -> AnyTwin;
+    fn rounding(&self, rounds: bool) -> AnyTwin;
     fn recognized(&self, signs: &Signs) -> Vec<Candidate>;
     fn modelled(&self) -> Vec<&'static str>;
 }
@@ -200,6 +201,10 @@ impl<T: Twin> Methods for Kind<T> {
 
     fn quiet(&self) -> AnyTwin {
         AnyTwin::new(self.0.quiet())
+    }
+
+    fn rounding(&self, rounds: bool) -> AnyTwin {
+        AnyTwin::new(self.0.rounding(rounds))
     }
 
     fn recognized(&self, signs: &Signs) -> Vec<Candidate> {
@@ -338,6 +343,10 @@ impl Twin for AnyTwin {
 
     fn quiet(&self) -> Self {
         self.0.quiet()
+    }
+
+    fn rounding(&self, rounds: bool) -> Self {
+        self.0.rounding(rounds)
     }
 
     fn recognized(&self, signs: &Signs) -> Vec<Candidate> {

@@ -18,11 +18,13 @@ pub type Registry<P> = &'static [&'static dyn Mechanism<P>];
 struct Part<P: Plant> {
     mechanism: &'static dyn Mechanism<P>,
     form: usize,
+    /// Whether it stays out of rollouts.
+    silent: bool,
 }
 
 impl<P: Plant> Clone for Part<P> {
     fn clone(&self) -> Self {
-        Self { mechanism: self.mechanism, form: self.form }
+        Self { mechanism: self.mechanism, form: self.form, silent: self.silent }
     }
 }
 
@@ -105,7 +107,7 @@ impl<P: Plant> Assembly<P> {
     /// Adds a mechanism in one of its forms, with the values its parameters have today.
     #[must_use]
     pub fn with_mechanism(mut self, mechanism: &'static dyn Mechanism<P>, form: usize, parameters: Vec<Parameter>) -> Self {
-        self.parts.push(Part { mechanism, form });
+        self.parts.push(Part { mechanism, form, silent: false });
         self.parameters.extend(parameters);
         self
     }
@@ -154,6 +156,9 @@ impl<P: Plant> Assembly<P> {
             let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
             let own = thetas.block(at, count);
             at += count;
+            if part.silent {
+                continue;
+            }
             let law = match self.quiet && !part.mechanism.followed(part.form) {
                 true => part.mechanism.mean(part.form, &own),
                 false => Some(part.mechanism.law(part.form, &own, seed.child(about.name))),
@@ -399,6 +404,21 @@ impl<P: Plant> Twin for Assembly<P> {
 
     fn quiet(&self) -> Self {
         Self { quiet: true, ..self.clone() }
+    }
+
+    fn rounding(&self, rounds: bool) -> Self {
+        let mut twin = self.clone();
+        let mut at = self.own().len();
+        for part in &mut twin.parts {
+            let count = part.mechanism.forms(&Default::default())[part.form].parameters.len();
+            if part.mechanism.finishing(part.form) {
+                part.silent = !rounds;
+                let steps = twin.parameters[at..at + count].iter_mut();
+                steps.filter(|_| !rounds).for_each(|step| step.prior = Some(0.0));
+            }
+            at += count;
+        }
+        twin
     }
 
     fn recognized(&self, signs: &Signs) -> Vec<Candidate> {

@@ -155,6 +155,12 @@ pub trait Twin: Simulator + Clone + 'static {
     fn quiet(&self) -> Self {
         self.clone()
     }
+    /// The twin with what only rounds, or without: where something is fitted, for a staircase has no slope to follow. Without, steps
+    /// are known as they are given.
+    #[must_use]
+    fn rounding(&self, _rounds: bool) -> Self {
+        self.clone()
+    }
     /// The mechanisms that `signs` show by themselves, their parameters' nominal values as shown.
     fn recognized(&self, _signs: &Signs) -> Vec<Candidate> {
         Vec::new()

@@ -2,7 +2,7 @@
 
 use super::noise::channel_weights;
 use crate::sim2real::identify::{Problem, State};
-use crate::sim2real::{ChannelWeight, Clock, Part, Recording, Seed, Simulator, Thetas};
+use crate::sim2real::{ChannelWeight, Clock, Part, Recording, Seed, Simulator, Thetas, Twin};
 
 /// Part of each recording that is held out where no recording is given for that.
 pub const HELD_OUT: f64 = 0.3;
@@ -113,7 +113,7 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
 
     /// The state from which a simulator at `theta` best starts a held-out part: estimated from the rows before it where a
     /// run passes through them, from its first rows elsewhere.
-    pub(super) fn settled<T: Simulator<Stimulus = S>>(&self, simulator: &T, theta: &[f64], part: &Part<'a, S>) -> Vec<f64> {
+    pub(super) fn settled<T: Twin<Stimulus = S>>(&self, simulator: &T, theta: &[f64], part: &Part<'a, S>) -> Vec<f64> {
         settled(simulator, theta, part, &self.weights)
     }
 }
@@ -121,12 +121,8 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
 /// The state from which a simulator at `theta` best starts `part`: estimated from the rows before it where a run passes through
 /// them, from its first rows elsewhere. The noise of each channel is that of `weights`.
 #[must_use]
-pub fn settled<S: Simulator>(
-    simulator: &S,
-    theta: &[f64],
-    part: &Part<'_, S::Stimulus>,
-    weights: &[ChannelWeight],
-) -> Vec<f64> {
+pub fn settled<T: Twin>(simulator: &T, theta: &[f64], part: &Part<'_, T::Stimulus>, weights: &[ChannelWeight]) -> Vec<f64> {
+    let simulator = &simulator.rounding(false);
     let end = if part.rows.start > part.start {
         part.rows.start
     } else {

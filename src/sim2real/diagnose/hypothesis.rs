@@ -255,7 +255,8 @@ impl<T: Twin> Inquiry<'_, T> {
         if self.evidence.window.is_none() {
             return hypothesis.fit.clone();
         }
-        let problem = self.problem(&hypothesis.twin, &self.evidence.free_run);
+        let twin = hypothesis.twin.rounding(false);
+        let problem = self.problem(&twin, &self.evidence.free_run);
         let start = std::slice::from_ref(&hypothesis.fit.values);
         fit(&problem, start, &hypothesis.fit.free, &State::estimated(&problem), Effort::Thorough)
     }

@@ -195,7 +195,7 @@ fn of_one<T: Twin>(
     let cleaned =
         (signs.repeated > 0.0).then(|| [recordings, held_out].map(|all| recognize::without_repeats(twin, all, &channel)));
     let [recordings, held_out] = cleaned.as_ref().map_or([recordings, held_out], |all| all.each_ref().map(Vec::as_slice));
-    answered(&twin.quiet(), recordings, held_out, &found, seed, progress)
+    answered(&twin.quiet().rounding(false), recordings, held_out, &found, seed, progress)
 }
 
 /// What the recordings show by themselves.
@@ -330,7 +330,7 @@ fn as_stamped(
     let facts = verdict::facts(&inquiry, &findings);
     let mut added: Vec<Candidate> = selection.selected.added.iter().map(|number| candidates[*number].clone()).collect();
     let mut correlation = trued.correlation(selection.selected.twin.parameters());
-    let (mut trued_twin, mut values, mut std) = (selection.selected.twin, known.values, findings.std);
+    let (mut trued_twin, mut values, mut std) = (selection.selected.twin.rounding(true), known.values, findings.std);
     for candidate in seen {
         trued_twin = trued_twin.with(candidate);
         values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
@@ -393,7 +393,7 @@ pub fn calibrate<T: Twin>(
     progress: Progress<'_>,
 ) -> Calibration {
     let [recordings, held_out] = [recordings, held_out].map(any_recordings);
-    refitted(&AnyTwin::new(twin.clone()), &recordings, &held_out, seed, progress)
+    refitted(&AnyTwin::new(twin.quiet().rounding(false)), &recordings, &held_out, seed, progress)
 }
 
 /// The same of a twin of any kind.

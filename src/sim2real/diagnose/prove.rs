@@ -36,7 +36,7 @@ pub(super) fn compared<T: Twin>(
             let run = |(twin, theta): (&T, &[f64])| {
                 let state = evidence.settled(twin, theta, part);
                 let lane: Vec<f64> = theta.iter().chain(&state).copied().collect();
-                twin.rollout(&Thetas::single(&lane), part.recording, part.followed(), seed).swap_remove(0)
+                twin.rounding(true).rollout(&Thetas::single(&lane), part.recording, part.followed(), seed).swap_remove(0)
             };
             let runs = [run(contest.nominal), run(contest.recalibrated), run(contest.trued)];
             evidence.weights.iter().filter_map(|w| comparison(part, *held_out, w, &runs, contest.trued.0)).collect()
