@@ -1,7 +1,7 @@
 //! `cart_pole`: a cart on a track, and a pole that swings freely on it.
 
 use super::cart_pole_lane::Lane;
-use super::estimate::{initial_rate, local, motion, rounding, typical};
+use super::estimate::{begun, initial_rate, motion, rounding, typical};
 use super::joint::Axis;
 use super::mover::{Motion, Mover, Push};
 use super::runge_kutta::{Contact, step_with_friction};
@@ -155,8 +155,8 @@ impl Plant for CartPole {
     /// As those of a joint: value and rate as a parabola through the rows around `row` has them, of the cart's position with a
     /// wide prior, so that an offset of the sensor shows.
     fn initial_parameters(&self, recording: &Recording<Commands>, row: usize) -> Vec<Parameter> {
-        let cart = local(recording, "position", "velocity", row).unwrap_or_default();
-        let pole = local(recording, "angle", "angular_velocity", row).unwrap_or_default();
+        let cart = begun(recording, "position", "velocity", row);
+        let pole = begun(recording, "angle", "angular_velocity", row);
         let recordings = std::slice::from_ref(recording);
         let moves = self.typical(recordings);
         let turns = || typical(recordings, "angle", "angular_velocity", 1.0).rate;

@@ -9,6 +9,8 @@ use crate::sim2real::{Measured, Parameter, Recording, Typical};
 pub(super) struct Estimate {
     /// Value, in the channel's unit.
     pub value: f64,
+    /// Standard deviation of `value`; infinite where nothing tells it.
+    pub value_std: f64,
     /// Rate [the channel's unit/s].
     pub rate: f64,
     /// Standard deviation of `rate`, in its unit; infinite where nothing tells it.
@@ -47,7 +49,7 @@ pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row:
     let scale = points.iter().map(|(t, _)| t.abs()).fold(0.0, f64::max);
     if points.len() < FEWEST || scale <= 0.0 {
         let (_, value) = points.first()?;
-        return Some(Estimate { value: *value, rate: 0.0, rate_std: f64::INFINITY });
+        return Some(Estimate { value: *value, value_std: f64::INFINITY, rate: 0.0, rate_std: f64::INFINITY });
     }
     let powers = |t: f64| Vector3::new(1.0, t / scale, (t / scale).powi(2));
     let (mut information, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -65,10 +67,26 @@ pub(super) fn local<S>(recording: &Recording<S>, channel: &str, rate: &str, row:
     let measured = recording.channel(rate).and_then(|v| v.samples[row]);
     Some(Estimate {
         value: solution[0],
+        value_std: ((variance + rounded) * inverse[(0, 0)]).sqrt(),
         rate: measured.unwrap_or(solution[1] / scale),
         rate_std: ((variance + rounded) * inverse[(1, 1)]).sqrt() / scale,
     })
 }
+
+/// Value and rate at `row`, where a recording or a window of it is followed from. A rate that is measured is taken where the samples of
+/// `channel` tell far less of it: it may be late or out of scale, and one sample of it as noisy as any.
+pub(super) fn begun<S>(recording: &Recording<S>, channel: &str, rate: &str, row: usize) -> Estimate {
+    let seen = local(recording, channel, "", row).unwrap_or_default();
+    match local(recording, rate, "", row) {
+        Some(told) if told.value_std.is_finite() && FAR_LESS * told.value_std < seen.rate_std => {
+            Estimate { rate: told.value, rate_std: told.value_std, ..seen }
+        }
+        _ => seen,
+    }
+}
+
+/// So many times as wide a standard deviation is far less.
+const FAR_LESS: f64 = 3.0;
 
 /// The step in which samples about `row` are counted, where some of them repeat each other: the smallest of their changes, or the next
 /// one where they do not change at all. 0 where none repeats another, and where nothing ever changes.
@@ -217,6 +235,15 @@ mod tests {
         let middle = local(&recording, "q", "qd", 20).unwrap();
         assert!((middle.value - 1.52).abs() < 1e-9 && (middle.rate - 3.2).abs() < 1e-9, "{middle:?}");
         assert!(local(&recording, "none", "", 20).is_none());
+        // A rate is what positions change by, until these tell far less of it than what is measured of it.
+        let mut with_rate = recording;
+        let uneven = |i: usize, size: f64| if i.is_multiple_of(3) { size } else { -0.5 * size };
+        let samples = (0..40).map(|i| Some(2.5 + 0.06 * i as f64 + uneven(i, 0.01))).collect();
+        with_rate.measured.push(Measured { channel: "v".into(), unit: "m/s".into(), samples });
+        assert!((begun(&with_rate, "q", "v", 20).rate - 3.2).abs() < 1e-9);
+        let rough = |(i, y): (usize, &mut Option<f64>)| *y = y.map(|y| y + uneven(i, 0.2));
+        with_rate.measured[0].samples.iter_mut().enumerate().for_each(rough);
+        assert!((begun(&with_rate, "q", "v", 20).rate - 3.7).abs() < 0.01);
     }
 
     #[test]

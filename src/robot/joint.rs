@@ -1,6 +1,6 @@
 //! `joint`: one servo joint, or a linear axis.
 
-use super::estimate::{initial_rate, local, motion, rounding, typical};
+use super::estimate::{begun, initial_rate, motion, rounding, typical};
 use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
 use super::sine::{sine, sines};
@@ -167,7 +167,7 @@ impl Plant for Joint {
     /// Position and velocity as a parabola through the rows around `row` has them. The position's prior is wide, so that
     /// an offset of the sensor shows in the motion that follows rather than be taken for where the joint was.
     fn initial_parameters(&self, recording: &Recording<Commands>, row: usize) -> Vec<Parameter> {
-        let estimate = local(recording, "position", "velocity", row).unwrap_or_default();
+        let estimate = begun(recording, "position", "velocity", row);
         let typical = self.typical(std::slice::from_ref(recording));
         vec![
             Parameter::new("initial position", "rad", estimate.value).known_to(0.3 * typical.output.max(1e-9)),

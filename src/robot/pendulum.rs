@@ -1,6 +1,6 @@
 //! `pendulum`: a rod on a hinge, driven by a torque, as Gymnasium has it.
 
-use super::estimate::{initial_rate, local, motion, rounding, typical};
+use super::estimate::{begun, initial_rate, motion, rounding, typical};
 use super::joint::{Axis, CREEP_RATE, CREEP_SHARE, Posture};
 use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
@@ -84,7 +84,7 @@ impl Plant for Pendulum {
     }
 
     fn initial_parameters(&self, recording: &Recording<Commands>, row: usize) -> Vec<Parameter> {
-        let estimate = local(recording, "angle", "angular_velocity", row).unwrap_or_default();
+        let estimate = begun(recording, "angle", "angular_velocity", row);
         let usual = || self.typical(std::slice::from_ref(recording)).rate;
         vec![
             Parameter::new("initial angle", "rad", estimate.value).known_to(0.3),
