@@ -92,7 +92,7 @@ impl Fit {
 pub fn fit_smooth<S: Simulator>(problem: &Problem<'_, S>, start: &[f64], free: &[usize], state: &State) -> Fit {
     let mut descent = Descent::new(problem, start, free, state);
     descent.run(Effort::Thorough.steps());
-    descent.fit()
+    descent.freed(Effort::Thorough.steps()).fit()
 }
 
 /// How far a fit goes.
@@ -149,6 +149,7 @@ pub fn fit_from<S: Simulator>(
         descents.par_iter_mut().for_each(|d| d.run_while_falling(Effort::Thorough.steps(), FALLING));
     }
     match descents.into_iter().min_by(|a, b| a.objective.total_cmp(&b.objective)) {
+        Some(best) if effort == Effort::Thorough => best.freed(steps).fit(),
         Some(best) => best.fit(),
         None => fit_smooth(problem, &problem.nominal(), free, state),
     }
@@ -163,6 +164,13 @@ const NEAR: f64 = 1.05;
 /// A brief fit goes on while each step takes away at least this part of what is left: it has not come to what it can do.
 const FALLING: f64 = 0.1;
 
+/// A fit that leaves no more than this many times the square of the noise has come to its end; ...
+const STANDS: f64 = 1.1;
+/// ... one that does not makes some other steps, and more while each takes away this part of what is left, ...
+const SLOWLY: f64 = 0.01;
+/// ... and goes on from there where so little is left of that, beside the noise.
+const FREED: f64 = 0.5;
+
 /// A fit under way.
 struct Descent<'a, 'b, S: Simulator> {
     problem: &'a Problem<'b, S>,
@@ -175,6 +183,8 @@ struct Descent<'a, 'b, S: Simulator> {
     /// Sum of squares there, priors of the parameters included.
     objective: f64,
     damping: f64,
+    /// Whether the steps of initial states are damped too.
+    holds_back: bool,
     /// The part of the objective that the last step took away.
     fell: f64,
     ended: bool,
@@ -187,8 +197,9 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let state = state.clone();
         let runs = problem.followed(&theta, &state, free);
         let normal = Normal::new(&runs, &state);
-        let (objective, damping, fell) = (0.0, DAMPING, 0.0);
-        let mut descent = Self { problem, free, theta, state, runs, normal, objective, damping, fell, ended: false };
+        let (objective, damping, fell, ended) = (0.0, DAMPING, 0.0, false);
+        let holds_back = false;
+        let mut descent = Self { problem, free, theta, state, runs, normal, objective, damping, holds_back, fell, ended };
         descent.temper();
         descent
     }
@@ -234,6 +245,28 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             }
             self.step();
         }
+    }
+
+    /// Goes on from where it came to, if that is far from an end: where dry friction, a stop or a pendulum near its top make something else
+    /// of the step that is best for initial states of a linear plant, no damping of the parameters alone leads anywhere.
+    ///
+    /// What is gained a little at a time that way is as often the wrong valley's as the right one's: it counts where it is most of what
+    /// was left.
+    fn freed(mut self, steps: usize) -> Self {
+        if self.objective <= STANDS * self.normal.measured as f64 || self.state.values.iter().all(Vec::is_empty) {
+            return self;
+        }
+        let mut other = Self::new(self.problem, &self.theta, self.free, &self.state);
+        (other.holds_back, other.damping) = (true, 1.0);
+        other.run(PROBE + 1);
+        other.run_while_falling(steps, SLOWLY);
+        let noise = self.normal.measured as f64;
+        if other.objective - noise < FREED * (self.objective - noise) {
+            (other.holds_back, other.ended) = (false, false);
+            other.run(steps);
+            self = other;
+        }
+        self
     }
 
     /// One step: the best of several dampings, or none where more damping does not help either.
@@ -297,9 +330,8 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             .collect()
     }
 
-    /// Where a step of this damping leads, initial states and all. Their own step, to what is best at these parameters of a linear
-    /// plant, is held back as those of the parameters are: where dry friction, a stop or a pendulum near its top make something else
-    /// of so long a step, no damping of the parameters alone would lead anywhere.
+    /// Where a step of this damping leads, initial states and all: these to what is best there of a linear plant, or held back as the
+    /// parameters are.
     fn moved(&self, information: &DMatrix<f64>, gradient: &DVector<f64>, held: &[bool], damping: f64) -> (Vec<f64>, State) {
         let parameters = self.problem.simulator.parameters();
         let step = damped_step(information, gradient, held, damping);
@@ -310,10 +342,11 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             made[i] = theta[*k] - self.theta[*k];
         }
         let mut state = self.state.clone();
+        let own = if self.holds_back { 1.0 / (1.0 + damping) } else { 1.0 };
         for (part, values) in state.values.iter_mut().enumerate() {
             let along = &self.normal.initial_by_parameter[part] * &made;
             for ((value, step), along) in values.iter_mut().zip(self.normal.initial_step[part].iter()).zip(along.iter()) {
-                *value += step / (1.0 + damping) - along;
+                *value += own * step - along;
             }
         }
         (theta, state)
