@@ -33,7 +33,7 @@ where
             name: "velocity_filter",
             site: Site::Observation,
             title: "a filter of the measured velocity",
-            law: "time_constant dw/dt = v - w, w for v; difference: (y(t) - y(t - window)) / window for v",
+            law: "v -> w, time_constant dw/dt = v - w; difference: v -> (y(t) - y(t - window)) / window",
             source: "Bélanger et al., Angular velocity and acceleration from shaft encoders, Int. J. Robot. Res. 17 (1998)",
             remedy: "filter the simulator's velocity as the drive does, or take positions alone",
             contains: &[],
