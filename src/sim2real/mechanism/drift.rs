@@ -21,6 +21,9 @@ pub struct Drift {
     pub rate: Option<usize>,
 }
 
+/// Forms from this one on are those before it, with the rate.
+const WITH_RATE: usize = 3;
+
 impl<P: Plant> Mechanism<P> for Drift
 where
     P::Observation: AsMut<[f64]>,
@@ -64,13 +67,13 @@ where
     }
 
     fn told_by(&self, form: usize) -> Option<usize> {
-        self.rate.filter(|_| form >= 3)
+        self.rate.filter(|_| form >= WITH_RATE)
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let size = thetas.row(0).to_vec();
         let times = || thetas.row(1).to_vec();
-        let law: Box<dyn Law<P>> = match form % 3 {
+        let law: Box<dyn Law<P>> = match form % WITH_RATE {
             0 => Box::new(Rate(size)),
             1 => Box::new(Settling { under_way: false, share: vec![0.0; size.len()], end: size, time_constant: times() }),
             _ => Box::new(Settling { under_way: true, share: thetas.row(2).to_vec(), end: size, time_constant: times() }),

@@ -20,6 +20,9 @@ pub struct Eccentricity {
     pub rate: Option<usize>,
 }
 
+/// Forms from this one on are those before it, with the rate.
+const WITH_RATE: usize = 2;
+
 impl<P: Plant> Mechanism<P> for Eccentricity
 where
     P::Observation: AsMut<[f64]>,
@@ -57,7 +60,7 @@ where
     }
 
     fn told_by(&self, form: usize) -> Option<usize> {
-        self.rate.filter(|_| form >= 2)
+        self.rate.filter(|_| form >= WITH_RATE)
     }
 
     /// A turn is a turn of an angle.
@@ -67,7 +70,7 @@ where
 
     /// Over less than a turn two harmonics may be bent into whatever else a sensor does.
     fn general(&self, form: usize) -> bool {
-        form % 2 == 1
+        form % WITH_RATE == 1
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

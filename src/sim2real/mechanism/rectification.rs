@@ -16,6 +16,9 @@ pub struct Rectification {
     pub rate: Option<usize>,
 }
 
+/// Forms from this one on are those before it, with the rate.
+const WITH_RATE: usize = 1;
+
 impl<P: Plant> Mechanism<P> for Rectification
 where
     P::Observation: AsMut<[f64]>,
@@ -42,7 +45,7 @@ where
     }
 
     fn told_by(&self, form: usize) -> Option<usize> {
-        self.rate.filter(|_| form >= 1)
+        self.rate.filter(|_| form >= WITH_RATE)
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

@@ -16,6 +16,9 @@ pub struct Scale {
     pub rate: Option<usize>,
 }
 
+/// Forms from this one on are those before it, with the rate.
+const WITH_RATE: usize = 2;
+
 impl<P: Plant> Mechanism<P> for Scale
 where
     P::Observation: AsMut<[f64]>,
@@ -50,12 +53,12 @@ where
     }
 
     fn told_by(&self, form: usize) -> Option<usize> {
-        self.rate.filter(|_| form >= 2)
+        self.rate.filter(|_| form >= WITH_RATE)
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let factor = thetas.row(0).iter().map(|error| 1.0 + error).collect();
-        let law: Box<dyn Law<P>> = match form % 2 {
+        let law: Box<dyn Law<P>> = match form % WITH_RATE {
             0 => Box::new(Factor(factor)),
             _ => Box::new(BentFactor { factor, bow: thetas.row(1).to_vec() }),
         };
