@@ -115,6 +115,10 @@ fn recordings_of_a_joint() {
     insta::assert_snapshot!("missing_recording", missing);
     let both = servo().refused("diagnose twin.toml --recording train.csv --holdout ./train.csv --out found");
     insta::assert_snapshot!("fitted_and_held_out", both);
+    let bytes = fs::read(servo().path("train.csv")).unwrap();
+    let copied = servo().write("again.csv", &bytes);
+    let copied = copied.refused("diagnose twin.toml --recording train.csv --holdout again.csv --out found");
+    insta::assert_snapshot!("fitted_and_held_out_by_another_name", copied);
     let folder = servo().refused("calibrate twin.toml --recording . --out found.toml");
     insta::assert_snapshot!("folder_for_a_file", folder);
 }
