@@ -332,3 +332,9 @@ fn a_second_effect_that_leaves_white_noise_need_not_carry_over() {
     assert_eq!(names(&tried(61, 33)), ["dead_zone", "stribeck_friction"]);
     assert_eq!(names(&tried(61, 192)), ["constant_load", "thermal_derating"]);
 }
+
+/// The teeth of a motor: a fit that held initial states back at every step ended in a wrong valley, and nothing explained it.
+#[test]
+fn a_fit_steps_freely_while_it_leads_anywhere() {
+    assert_eq!(names(&tried(70, 29)), ["cogging"]);
+}
