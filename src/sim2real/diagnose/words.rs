@@ -30,10 +30,10 @@ pub(super) fn summary(facts: &Facts, verdict: Verdict, effects: &[Effect]) -> St
     };
     let names = listed(&effects.iter().map(|e| title(&e.mechanism)).collect::<Vec<_>>());
     let name = &facts.name;
-    // The first channel is the one a twin is about; others speak where it gained nothing.
+    // The first channel is the one a twin is about; others speak where it gained nothing to speak of.
     let better = |fit: &&ChannelFit| fit.trued_rmse < fit.recalibrated_rmse;
-    let best = facts.fits.iter().find(|f| f.improvement_ci95[0] > 0.0).or(facts.fits.iter().find(better));
-    let best = best.or(facts.fits.first());
+    let gains = |least: f64| facts.fits.iter().find(|f| f.improvement_ci95[0] > least);
+    let best = gains(TO_SPEAK_OF).or(gains(0.0)).or(facts.fits.iter().find(better)).or(facts.fits.first());
     let gained = best.map_or_else(String::new, gained);
     match verdict {
         Verdict::Named => {
@@ -82,6 +82,9 @@ pub(super) fn summary(facts: &Facts, verdict: Verdict, effects: &[Effect]) -> St
         }
     }
 }
+
+/// A part of an error that is worth a sentence.
+const TO_SPEAK_OF: f64 = 0.01;
 
 /// What of something unknown one or `several` names stand for. Where hardly anything of the fitted misfit is left, held-out data speak
 /// against them.
@@ -218,6 +221,11 @@ mod tests {
         };
         let named = summary(&facts(None), Verdict::Ambiguous, &[]);
         assert!(named.contains("error of filled falls by 80 %"), "{named}");
+        let mut late = facts(None);
+        late.fits[0].improvement_ci95 = [1e-3, 3e-3];
+        late.fits[1].improvement_ci95 = [0.7, 0.9];
+        let named = summary(&late, Verdict::Ambiguous, &[]);
+        assert!(named.contains("error of filled falls by 80 %"), "a thousandth of the first is nothing: {named}");
         let said = summary(&facts(Some("others follow")), Verdict::Unexplained, &[]);
         assert!(said.ends_with("explains: others follow."), "{said}");
     }
