@@ -3,33 +3,21 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
-use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
-use trueup::sim2real::diagnose::{Verdict, calibrate, diagnose};
-use trueup::sim2real::{Assembly, Measured, Recording, Seed};
+mod arm_scene;
 
-/// Inertia [kg m^2], viscous friction [N m s/rad] and torque of gravity [N m] of the arm.
-const ARM: [f64; 3] = [0.096, 0.25, 2.35];
-/// What rows are apart [s].
-const SPACING: f64 = 4e-3;
+use arm_scene::{ARM, SPACING, twin};
+use trueup::robot::Commands;
+use trueup::sim2real::diagnose::{Verdict, calibrate, diagnose};
+use trueup::sim2real::{Recording, Seed};
+
 /// A turn in 4096 counts [rad].
 const STEP: f64 = std::f64::consts::TAU / 4096.0;
 
 /// An arm by short steps of the midpoint rule, its angle counted and written down to six decimals. There is no noise beside the steps.
 fn recorded(name: &str, salt: u64) -> Recording<Commands> {
-    let mut drawn = salt;
-    let mut chance = move || {
-        drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        2.0 * ((drawn >> 11) as f64 / (1_u64 << 53) as f64) - 1.0
-    };
-    let waves: Vec<[f64; 3]> = (1..8).map(|k| [0.5, 0.3 * f64::from(k) + 0.1 * chance(), 3.0 * chance()]).collect();
-    let (mut q, mut v, mut held) = (0.0_f64, 0.0_f64, 0.0);
-    let (mut commands, mut samples) = (Vec::new(), Vec::new());
-    let time: Vec<f64> = (0..3_000).map(|row| SPACING * f64::from(row)).collect();
-    for (row, t) in time.iter().enumerate() {
-        held = if row % 250 == 0 { chance() } else { held };
-        let command = held + waves.iter().map(|[height, rate, phase]| height * (6.0 * rate * t + phase).sin()).sum::<f64>();
-        commands.push(command);
-        samples.push(Some(((q / STEP).round() * STEP * 1e6).round() / 1e6));
+    let (mut q, mut v) = (0.0_f64, 0.0_f64);
+    arm_scene::recorded(name, salt, [("position", "rad")], |command, _| {
+        let read = ((q / STEP).round() * STEP * 1e6).round() / 1e6;
         let [inertia, viscous, gravity] = ARM;
         let faster = |q: f64, v: f64| (command - viscous * v - gravity * q.sin()) / inertia;
         for _ in 0..40 {
@@ -38,17 +26,14 @@ fn recorded(name: &str, salt: u64) -> Recording<Commands> {
             q += h * speed;
             v += h * faster(middle, speed);
         }
-    }
-    let measured = vec![Measured { channel: "position".into(), unit: "rad".into(), samples }];
-    Recording { name: name.into(), time, stimulus: Commands(commands), measured }
+        [read]
+    })
 }
 
 #[test]
 fn counts_are_steps_and_their_twin_is_right_and_can_be_fitted_again() {
-    let nominal = [0.11, 0.22, 2.6, 1.0];
-    let twin = Assembly::new(Joint::new(Axis::Rotary, nominal, [0.2, 0.2, 0.2, 0.0]), MECHANISMS);
     let [train, test] = [("train", 1), ("test", 2)].map(|(name, salt)| [recorded(name, salt)]);
-    let outcome = diagnose(&twin, &train, &test, Seed(0), &|_, _, _| {});
+    let outcome = diagnose(&twin(), &train, &test, Seed(0), &|_, _, _| {});
     let found = &outcome.diagnosis;
     assert_eq!(found.verdict, Verdict::Named, "{}", found.summary);
     assert_eq!(found.effects.len(), 1, "{}", found.summary);

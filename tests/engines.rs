@@ -3,33 +3,22 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
-use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
-use trueup::sim2real::diagnose::{Outcome, Verdict, diagnose};
-use trueup::sim2real::{Assembly, Measured, Recording, Seed, Simulator};
+mod arm_scene;
 
-/// Inertia [kg m^2], viscous friction [N m s/rad] and torque of gravity [N m] of the arm.
-const ARM: [f64; 3] = [0.096, 0.25, 2.35];
-/// Step of the engine, and what rows are apart [s].
+use arm_scene::{ARM, SPACING, twin};
+use trueup::robot::{Commands, Joint};
+use trueup::sim2real::diagnose::{Outcome, Verdict, diagnose};
+use trueup::sim2real::{Assembly, Recording, Seed, Simulator};
+
+/// Step of the engine [s].
 const STEP: f64 = 2e-3;
-const SPACING: f64 = 4e-3;
 
 /// An arm by semi-implicit steps, with so much dry friction [N m]: velocities first, and positions by the new velocities.
 fn recorded(name: &str, friction: f64, salt: u64) -> Recording<Commands> {
-    let mut drawn = salt;
-    let mut chance = move || {
-        drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        2.0 * ((drawn >> 11) as f64 / (1_u64 << 53) as f64) - 1.0
-    };
-    let waves: Vec<[f64; 3]> = (1..8).map(|k| [0.5, 0.3 * f64::from(k) + 0.1 * chance(), 3.0 * chance()]).collect();
-    let (mut q, mut v, mut held) = (0.0_f64, 0.0_f64, 0.0);
-    let (mut commands, mut samples) = (Vec::new(), Vec::new());
-    let time: Vec<f64> = (0..3_000).map(|row| SPACING * f64::from(row)).collect();
-    for (row, t) in time.iter().enumerate() {
-        held = if row % 250 == 0 { chance() } else { held };
-        let command = held + waves.iter().map(|[height, rate, phase]| height * (6.0 * rate * t + phase).sin()).sum::<f64>();
-        commands.push(command);
+    let (mut q, mut v) = (0.0_f64, 0.0_f64);
+    arm_scene::recorded(name, salt, [("position", "rad")], |command, chance| {
         // A noise of 0.5 mrad.
-        samples.push(Some(q + 8.7e-4 * chance()));
+        let read = q + 8.7e-4 * chance.draw();
         for _ in 0..(SPACING / STEP).round() as usize {
             let [inertia, viscous, gravity] = ARM;
             let free = (inertia * v + STEP * (command - gravity * q.sin())) / (inertia + STEP * viscous);
@@ -37,16 +26,13 @@ fn recorded(name: &str, friction: f64, salt: u64) -> Recording<Commands> {
             v = free - free.clamp(-most, most);
             q += STEP * v;
         }
-    }
-    let measured = vec![Measured { channel: "position".into(), unit: "rad".into(), samples }];
-    Recording { name: name.into(), time, stimulus: Commands(commands), measured }
+        [read]
+    })
 }
 
 fn diagnosed(friction: f64) -> Outcome<Assembly<Joint>> {
-    let nominal = [0.11, 0.22, 2.6, 1.0];
-    let twin = Assembly::new(Joint::new(Axis::Rotary, nominal, [0.2, 0.2, 0.2, 0.0]), MECHANISMS);
     let [train, test] = [("train", 1), ("test", 2)].map(|(name, salt)| recorded(name, friction, salt));
-    diagnose(&twin, &[train], &[test], Seed(0), &|_, _, _| {})
+    diagnose(&twin(), &[train], &[test], Seed(0), &|_, _, _| {})
 }
 
 /// The lead that a trued twin has, and what the notes say of it.

@@ -3,14 +3,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a value is missing")]
 
-use trueup::robot::{Axis, Commands, Joint, MECHANISMS};
-use trueup::sim2real::diagnose::{Outcome, Verdict, diagnose};
-use trueup::sim2real::{Assembly, Measured, Recording, Seed};
+mod arm_scene;
 
-/// Inertia [kg m^2], viscous friction [N m s/rad] and torque of gravity [N m] of the arm.
-const ARM: [f64; 3] = [0.096, 0.25, 2.35];
-/// What rows are apart [s].
-const SPACING: f64 = 4e-3;
+use arm_scene::{ARM, SPACING, twin};
+use trueup::robot::{Commands, Joint};
+use trueup::sim2real::diagnose::{Outcome, Verdict, diagnose};
+use trueup::sim2real::{Assembly, Recording, Seed};
 
 /// What an encoder reads at an angle, and by how much its readings change with that.
 type Encoder = fn(f64) -> [f64; 2];
@@ -40,55 +38,44 @@ enum Speed {
 
 /// An arm read by `encoder`, by the fourth-order method of Runge and Kutta, and its speed.
 fn recorded(name: &str, encoder: Encoder, speed: Speed, salt: u64) -> Recording<Commands> {
-    let mut drawn = salt;
-    let mut chance = move || {
-        drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        2.0 * ((drawn >> 11) as f64 / (1_u64 << 53) as f64) - 1.0
-    };
-    let waves: Vec<[f64; 3]> = (1..8).map(|k| [0.5, 0.3 * f64::from(k) + 0.1 * chance(), 3.0 * chance()]).collect();
-    let (mut q, mut v, mut held, mut filtered) = (0.0_f64, 0.0_f64, 0.0, 0.0);
-    let (mut commands, mut position, mut velocity) = (Vec::new(), Vec::new(), Vec::new());
-    let time: Vec<f64> = (0..3_000).map(|row| SPACING * f64::from(row)).collect();
-    for (row, t) in time.iter().enumerate() {
-        held = if row % 250 == 0 { chance() } else { held };
-        let command = held + waves.iter().map(|[height, rate, phase]| height * (6.0 * rate * t + phase).sin()).sum::<f64>();
+    let (mut q, mut v, mut filtered, mut last) = (0.0_f64, 0.0_f64, 0.0, None);
+    arm_scene::recorded(name, salt, [("position", "rad"), ("velocity", "rad/s")], |command, chance| {
         let [read, slope] = encoder(q);
-        commands.push(command);
-        let read = read + 8.7e-4 * chance();
-        filtered = match (speed, position.last()) {
-            (Speed::Filtered(time), Some(Some(last))) => {
-                filtered + (1.0 - f64::exp(-SPACING / time)) * ((read - last) / SPACING - filtered)
+        let read = read + 8.7e-4 * chance.draw();
+        let told = match speed {
+            Speed::Tachometer => v + 1.7e-2 * chance.draw(),
+            Speed::Readings => slope * v + 1.7e-2 * chance.draw(),
+            Speed::Filtered(time) => {
+                let difference = last.map_or(0.0, |last| (read - last) / SPACING);
+                filtered += (1.0 - f64::exp(-SPACING / time)) * (difference - filtered);
+                filtered
             }
-            _ => filtered,
         };
-        position.push(Some(read));
-        velocity.push(Some(match speed {
-            Speed::Tachometer => v + 1.7e-2 * chance(),
-            Speed::Readings => slope * v + 1.7e-2 * chance(),
-            Speed::Filtered(_) => filtered,
-        }));
-        let [inertia, viscous, gravity] = ARM;
-        let slope = |q: f64, v: f64| [v, (command - viscous * v - gravity * q.sin()) / inertia];
-        let h = 0.25 * SPACING;
-        for _ in 0..4 {
-            let a = slope(q, v);
-            let b = slope(q + 0.5 * h * a[0], v + 0.5 * h * a[1]);
-            let c = slope(q + 0.5 * h * b[0], v + 0.5 * h * b[1]);
-            let d = slope(q + h * c[0], v + h * c[1]);
-            q += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]);
-            v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]);
-        }
+        last = Some(read);
+        (q, v) = moved(q, v, command);
+        [read, told]
+    })
+}
+
+/// Angle and speed a row later.
+fn moved(mut q: f64, mut v: f64, command: f64) -> (f64, f64) {
+    let [inertia, viscous, gravity] = ARM;
+    let slope = |q: f64, v: f64| [v, (command - viscous * v - gravity * q.sin()) / inertia];
+    let h = 0.25 * SPACING;
+    for _ in 0..4 {
+        let a = slope(q, v);
+        let b = slope(q + 0.5 * h * a[0], v + 0.5 * h * a[1]);
+        let c = slope(q + 0.5 * h * b[0], v + 0.5 * h * b[1]);
+        let d = slope(q + h * c[0], v + h * c[1]);
+        q += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]);
+        v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]);
     }
-    let channel = |channel: &str, unit: &str, samples| Measured { channel: channel.into(), unit: unit.into(), samples };
-    let measured = vec![channel("position", "rad", position), channel("velocity", "rad/s", velocity)];
-    Recording { name: name.into(), time, stimulus: Commands(commands), measured }
+    (q, v)
 }
 
 fn diagnosed(encoder: Encoder, speed: Speed) -> Outcome<Assembly<Joint>> {
-    let nominal = [0.11, 0.22, 2.6, 1.0];
-    let twin = Assembly::new(Joint::new(Axis::Rotary, nominal, [0.2, 0.2, 0.2, 0.0]), MECHANISMS);
     let [train, test] = [("train", 1), ("test", 2)].map(|(name, salt)| recorded(name, encoder, speed, salt));
-    diagnose(&twin, &[train], &[test], Seed(0), &|_, _, _| {})
+    diagnose(&twin(), &[train], &[test], Seed(0), &|_, _, _| {})
 }
 
 /// The values of the only effect named, which is `mechanism`.

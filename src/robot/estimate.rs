@@ -247,6 +247,23 @@ mod tests {
     }
 
     #[test]
+    fn samples_that_repeat_each_other_do_not_tell_a_rate_exactly() {
+        let time: Vec<f64> = (0..300).map(|i| f64::from(i) * 0.01).collect();
+        let counted = |first: usize| (0..300).map(|i| Some(if i < first { 0.0 } else { 1e-3 })).collect();
+        let recording = |samples| Recording {
+            name: String::new(),
+            time: time.clone(),
+            stimulus: (),
+            measured: vec![Measured { channel: "q".into(), unit: "m".into(), samples }],
+        };
+        // A step in 0.5 s may go at 2 mm/s, and no slower than that is what eight rows of it tell.
+        let begun = local(&recording(counted(50)), "q", "", 0).unwrap();
+        assert!(begun.rate.abs() < 1e-12 && begun.rate_std > 2e-3, "{begun:?}");
+        // What never moves is at rest.
+        assert!(local(&recording(counted(300)), "q", "", 0).unwrap().rate_std < 1e-9);
+    }
+
+    #[test]
     fn where_samples_are_few_it_looks_farther() {
         let time: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.01).collect();
         let parabola = |t: f64| 1.0 + 2.0 * t + 3.0 * t * t;

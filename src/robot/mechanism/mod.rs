@@ -133,7 +133,9 @@ pub static EQUATIONS_MECHANISMS: Registry<Equations> =
 mod tests {
     use super::*;
     use crate::robot::{Axis, Commands};
-    use crate::sim2real::{Assembly, Measured, Mechanism, Recording, Seed, Simulator, Thetas, check_lanes, check_mechanism};
+    use crate::sim2real::{
+        Assembly, Measured, Mechanism, Recording, Seed, Simulator, Thetas, Twin, check_lanes, check_mechanism,
+    };
 
     #[test]
     fn every_row_keeps_the_contract() {
@@ -157,6 +159,31 @@ mod tests {
         let disc = Eccentricity { rate: None };
         let applies = |axis| disc.applies(0, &Joint::new(axis, [1.0; 4], [0.0; 4]), &Commands::default());
         assert!(applies(Axis::Rotary) && !applies(Axis::Linear));
+    }
+
+    #[test]
+    fn what_only_a_velocity_tells_is_tried_where_one_is_measured() {
+        let samples = || (0..100).map(|i| Some((0.1 * f64::from(i)).sin())).collect();
+        let channel =
+            |channel: &str, unit: &str| Measured { channel: channel.into(), unit: unit.into(), samples: samples() };
+        let mut recording = Recording {
+            name: "swing".into(),
+            time: (0..100).map(|i| f64::from(i) * 4e-3).collect(),
+            stimulus: Commands(vec![1.0; 100]),
+            measured: vec![channel("position", "rad")],
+        };
+        let twin = Assembly::new(Joint::new(Axis::Rotary, [1.0; 4], [0.2; 4]), MECHANISMS);
+        let of_rates = |recording: &Recording<Commands>| {
+            let candidates = twin.candidates(std::slice::from_ref(recording));
+            let own = candidates.iter().filter(|c| c.about.name == "velocity_filter" || c.form.name.ends_with("with_rate"));
+            own.count()
+        };
+        assert_eq!(of_rates(&recording), 0);
+        recording.measured.push(channel("velocity", "rad/s"));
+        assert_eq!(of_rates(&recording), 10);
+        // A column without a sample is none.
+        recording.measured[1].samples.fill(None);
+        assert_eq!(of_rates(&recording), 0);
     }
 
     /// A run that starts in the middle of a recording, from the state the whole had there, is as warm as the whole.

@@ -60,7 +60,7 @@ where
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let lanes = thetas.lanes();
         let row = |number: Option<usize>| number.map_or_else(|| vec![0.0; lanes], |k| thetas.row(k).to_vec());
-        let [time_constant, window] = rows(form);
+        let [time_constant, window] = numbers(form);
         Box::new(Filter::<P> {
             time_constants: row(time_constant),
             windows: row(window),
@@ -73,7 +73,7 @@ where
 }
 
 /// Which parameters of a form are the time constant and the window.
-fn rows(form: usize) -> [Option<usize>; 2] {
+fn numbers(form: usize) -> [Option<usize>; 2] {
     match form {
         LOW_PASS => [Some(0), None],
         DIFFERENCE => [None, Some(0)],
@@ -151,7 +151,7 @@ where
 {
     fn change(&mut self, change: &LaneChange<'_>) {
         let of = |number: Option<usize>| move |values: &[f64]| number.map_or(0.0, |k| values[k]);
-        let [time_constant, window] = rows(self.form);
+        let [time_constant, window] = numbers(self.form);
         change.derived(&mut self.time_constants, of(time_constant));
         change.derived(&mut self.windows, of(window));
         change.memory(&mut self.lines);
