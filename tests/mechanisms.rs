@@ -91,17 +91,23 @@ fn reference(law: Law, h: f64) -> Vec<f64> {
 
 /// Positions as the assembly has them, with the mechanism or with none.
 fn assembly(case: &Case, present: bool) -> Vec<f64> {
+    let own = [(case.mechanism, case.form, case.values)];
+    together(if present { &own } else { &[] })
+}
+
+/// The same with several mechanisms, each in a form and with values of its parameters.
+fn together(parts: &[(&str, &str, &[f64])]) -> Vec<f64> {
     let time: Vec<f64> = (0..ROWS).map(|row| row as f64 * ROW).collect();
     let stimulus = Commands((0..ROWS).map(command).collect());
     let recording = Recording { name: "trial".into(), stimulus, measured: vec![], time };
-    let mechanism = MECHANISMS.iter().find(|m| m.about().name == case.mechanism).unwrap();
-    let forms = mechanism.forms(&Typical::default());
-    let form = forms.iter().position(|form| form.name == case.form).unwrap();
-    let bare = Assembly::new(Joint::new(Axis::Rotary, ARM, [0.0; 4]), MECHANISMS);
-    let (assembly, values) = match present {
-        true => (bare.with_mechanism(*mechanism, form, forms[form].parameters.clone()), case.values),
-        false => (bare, &[][..]),
-    };
+    let mut assembly = Assembly::new(Joint::new(Axis::Rotary, ARM, [0.0; 4]), MECHANISMS);
+    for (name, form, _) in parts {
+        let mechanism = MECHANISMS.iter().find(|m| m.about().name == *name).unwrap();
+        let forms = mechanism.forms(&Typical::default());
+        let number = forms.iter().position(|own| own.name == *form).unwrap();
+        assembly = assembly.with_mechanism(*mechanism, number, forms[number].parameters.clone());
+    }
+    let values = parts.iter().flat_map(|(.., values)| values.iter());
     let theta: Vec<f64> = ARM.iter().chain(values).chain(&[0.0, 0.0]).copied().collect();
     assembly.rollout(&Thetas::single(&theta), &recording, 0..ROWS, Seed(0))[0][0].samples.clone()
 }
@@ -126,6 +132,12 @@ fn motor_and_link(x: State, u: f64, share: f64, dry: f64, transmitted: f64) -> F
         dry: 0.0,
         more: [x[3], (net - rubs) / (share * INERTIA)],
     }
+}
+
+/// A motor with friction `dry` on a shaft of 40 N m/rad.
+fn shaft(x: State, u: f64, dry: f64) -> Forces {
+    let damping = 0.1 * (40.0 * 0.24 * INERTIA).sqrt();
+    motor_and_link(x, u, 0.6, dry, 40.0 * (x[2] - x[0]) + damping * (x[3] - x[1]))
 }
 
 /// What the gap's touch transmits from motor to link.
@@ -312,11 +324,14 @@ const CASES: &[Case] = &[
         mechanism: "compliance",
         form: "on_link",
         values: &[1.0 / 40.0, 0.6, 0.05],
-        law: |_, x, u| {
-            let reduced = 0.24 * INERTIA;
-            let damping = 0.1 * (40.0 * reduced).sqrt();
-            motor_and_link(x, u, 0.6, 0.0, 40.0 * (x[2] - x[0]) + damping * (x[3] - x[1]))
-        },
+        law: |_, x, u| shaft(x, u, 0.0),
+        most: 1e-4,
+    },
+    Case {
+        mechanism: "compliance",
+        form: "on_link_motor_friction",
+        values: &[1.0 / 40.0, 0.6, 0.05],
+        law: |_, x, u| shaft(x, u, 0.0),
         most: 1e-4,
     },
     Case {
@@ -469,6 +484,27 @@ fn every_mechanism_of_motion_follows_an_integration_of_its_own() {
     }
     assert!(!failed, "\n{report}");
     println!("{report}");
+}
+
+/// Dry friction behind a shaft: that of the motor, at its speed, whichever of the two laws is named first. Friction of the link is another.
+#[test]
+fn dry_friction_may_be_that_of_the_motor_behind_a_shaft() {
+    let friction: [(_, _, &[f64], Law); 2] = [
+        ("coulomb_friction", "dry", &[0.3], |_, x, u| shaft(x, u, 0.3)),
+        ("stribeck_friction", "gaussian", &[0.2, 0.3, 0.5], |_, x, u| {
+            shaft(x, u, 0.2 + 0.3 * (-(x[3] / 0.5).powi(2)).exp())
+        }),
+    ];
+    for (name, form, values, law) in friction {
+        let truth = reference(law, 1e-5);
+        let beside = |shaft| [(name, form, values), ("compliance", shaft, &[1.0 / 40.0, 0.6, 0.05][..])];
+        let [friction, shaft] = beside("on_link_motor_friction");
+        let off = worst(&together(&[friction, shaft]), &truth);
+        assert!(off < 2e-3, "{name}: {off:.1e} rad");
+        assert_eq!(together(&[friction, shaft]), together(&[shaft, friction]), "{name}: whichever is first");
+        let of_the_link = worst(&together(&beside("on_link")), &truth);
+        assert!(of_the_link > 20e-3, "{name}: {of_the_link:.1e} rad");
+    }
 }
 
 /// Play acts on commands, so its reference does too: the arm of the reference under commands that were passed through play.

@@ -34,6 +34,15 @@ pub struct Push {
     pub creeping_friction: f64,
     /// Inertia beside the plant's own [kg m^2].
     pub inertia: f64,
+    /// How much faster than the coordinate that mass moves on which dry friction rubs, where it is another one [rad/s].
+    pub ahead: f64,
+}
+
+impl Push {
+    /// Takes away all dry friction, and gives how much it can hold against [N m].
+    pub(super) fn without_dry_friction(&mut self) -> f64 {
+        std::mem::take(&mut self.dry_friction) + std::mem::take(&mut self.creeping_friction)
+    }
 }
 
 /// A plant with a coordinate that mechanisms of motion can act on.

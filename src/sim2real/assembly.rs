@@ -145,6 +145,8 @@ impl<P: Plant> Assembly<P> {
             dynamics,
             command_laws: Vec::new(),
             plant_laws: Vec::new(),
+            turns: Vec::new(),
+            late: 0,
             observation_laws: Vec::new(),
             effects: vec![P::Effect::default(); lanes],
             commands: Vec::with_capacity(lanes),
@@ -170,6 +172,8 @@ impl<P: Plant> Assembly<P> {
                 Site::Observation => run.observation_laws.push(law),
             }
         }
+        let (late, early): (Vec<usize>, Vec<usize>) = (0..run.plant_laws.len()).partition(|k| run.plant_laws[*k].late());
+        (run.turns, run.late) = ([early, late.clone()].concat(), late.len());
         run
     }
 }
@@ -334,7 +338,10 @@ impl<P: Plant> Assembly<P> {
                     let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
                     let (ages, seldom) = (mechanism.ages(), mechanism.seldom());
                     let bounds = bounds(&widest[form_index]);
-                    candidates.push(Candidate { about, form, form_index, finishing, general, ages, seldom, bounds });
+                    // Beside what is modelled already it differs from the first.
+                    let others = mechanism.beside(form_index);
+                    let beside = if others.iter().any(|other| modelled.contains(other)) { &[] } else { others };
+                    candidates.push(Candidate { about, form, form_index, finishing, general, beside, ages, seldom, bounds });
                 }
             }
         }
@@ -430,8 +437,8 @@ impl<P: Plant> Twin for Assembly<P> {
                 let Some(values) = mechanism.recognized(form_index, signs) else { continue };
                 form.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.nominal = value);
                 let (about, ages, seldom) = (mechanism.about(), mechanism.ages(), mechanism.seldom());
-                let (finishing, general, bounds) = (false, false, bounds(&form));
-                found.push(Candidate { about, form, form_index, finishing, general, ages, seldom, bounds });
+                let (finishing, general, beside, bounds) = (false, false, &[][..], bounds(&form));
+                found.push(Candidate { about, form, form_index, finishing, general, beside, ages, seldom, bounds });
             }
         }
         found

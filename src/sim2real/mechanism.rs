@@ -190,6 +190,11 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn told_by(&self, _form: usize) -> Option<usize> {
         None
     }
+    /// Mechanisms of which one has to be there for form `form` to differ from a plainer one: it is tried beside these alone. None where it
+    /// differs by itself.
+    fn beside(&self, _form: usize) -> &'static [&'static str] {
+        &[]
+    }
     /// Values of form `form`'s parameters where the measured channels themselves show `signs` of it.
     fn recognized(&self, _form: usize, _signs: &Signs) -> Option<Vec<f64>> {
         None
@@ -227,6 +232,13 @@ pub trait Law<P: Plant>: DynClone + Send {
     fn shape(&mut self, _tick: Tick, _commands: &mut [P::Command]) {}
     /// Adds to what acts inside the plant, one effect a lane.
     fn act(&mut self, _tick: Tick, _scene: &Scene<'_, P>, _effects: &mut [P::Effect]) {}
+    /// Whether it acts inside the plant after all laws that do not, as one that moves elsewhere what these have added. It
+    /// [`prepare`](Law::prepare)s what they are to see.
+    fn late(&self) -> bool {
+        false
+    }
+    /// What comes before all laws act inside the plant; asked of those alone that are [`late`](Law::late).
+    fn prepare(&mut self, _scene: &Scene<'_, P>, _effects: &mut [P::Effect]) {}
     /// Distorts the observations on their way back, one a lane.
     fn sense(&mut self, _time: f64, _observations: &mut [P::Observation]) {}
     /// As [`shape`](Law::shape), where every lane has its own clock. Laws to which more matters than the length of a tick have their

@@ -10,6 +10,10 @@ pub struct Run<P: Plant> {
     pub(super) dynamics: P::Dynamics,
     pub(super) command_laws: Vec<Box<dyn Law<P>>>,
     pub(super) plant_laws: Vec<Box<dyn Law<P>>>,
+    /// Numbers of the plant laws in the order in which they act, ...
+    pub(super) turns: Vec<usize>,
+    /// ... of which the last so many are late.
+    pub(super) late: usize,
     pub(super) observation_laws: Vec<Box<dyn Law<P>>>,
     pub(super) states: Vec<P::State>,
     pub(super) effects: Vec<P::Effect>,
@@ -24,12 +28,14 @@ where
 {
     fn clone(&self) -> Self {
         let Self { controller, dynamics, command_laws, plant_laws, observation_laws, .. } = self;
-        let Self { states, effects, commands, inputs, observations, .. } = self;
+        let Self { turns, late, states, effects, commands, inputs, observations, .. } = self;
         Self {
             controller: controller.clone(),
             dynamics: dynamics.clone(),
             command_laws: command_laws.clone(),
             plant_laws: plant_laws.clone(),
+            turns: turns.clone(),
+            late: *late,
             observation_laws: observation_laws.clone(),
             states: states.clone(),
             effects: effects.clone(),
@@ -118,14 +124,24 @@ impl<P: Plant> Run<P> {
         mut seen: impl FnMut(usize, &[P::Effect]),
     ) {
         self.meet(input);
-        self.effects.fill(P::Effect::default());
-        for (k, law) in self.plant_laws.iter_mut().enumerate() {
+        self.prepare();
+        for k in &self.turns {
             let scene =
                 Scene { dynamics: &self.dynamics, states: &self.states, inputs: &self.inputs, commands: &self.commands };
-            law.act(tick, &scene, &mut self.effects);
-            seen(k, &self.effects);
+            self.plant_laws[*k].act(tick, &scene, &mut self.effects);
+            seen(*k, &self.effects);
         }
         self.dynamics.advance(tick, &mut self.states, &self.inputs, &self.commands, &self.effects);
+    }
+
+    /// Empties the effects, but for what late laws prepare.
+    fn prepare(&mut self) {
+        self.effects.fill(P::Effect::default());
+        for k in &self.turns[self.turns.len() - self.late..] {
+            let scene =
+                Scene { dynamics: &self.dynamics, states: &self.states, inputs: &self.inputs, commands: &self.commands };
+            self.plant_laws[*k].prepare(&scene, &mut self.effects);
+        }
     }
 
     /// What each lane meets. Parameters by which lanes differ seldom change what arrives, and looking up what it meets takes longer than
@@ -144,11 +160,11 @@ impl<P: Plant> Run<P> {
 
     /// As [`advance`](Self::advance), where every lane has its own clock and the inputs are there.
     pub(super) fn advance_each(&mut self, ticks: Ticks<'_>) {
-        self.effects.fill(P::Effect::default());
-        for law in &mut self.plant_laws {
+        self.prepare();
+        for k in &self.turns {
             let scene =
                 Scene { dynamics: &self.dynamics, states: &self.states, inputs: &self.inputs, commands: &self.commands };
-            law.act_each(ticks, &scene, &mut self.effects);
+            self.plant_laws[*k].act_each(ticks, &scene, &mut self.effects);
         }
         self.dynamics.advance(ticks.lane(0), &mut self.states, &self.inputs, &self.commands, &self.effects);
     }

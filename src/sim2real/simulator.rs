@@ -126,6 +126,8 @@ pub struct Candidate {
     pub finishing: bool,
     /// Whether it is a wider law of which a plainer form is one case, and is tried only in the place of that.
     pub general: bool,
+    /// Mechanisms beside one of which alone it is tried; none where it differs from a plainer form by itself.
+    pub beside: &'static [&'static str],
     /// Whether its law is another one at another time, whatever the plant does meanwhile.
     pub ages: bool,
     /// Whether its law is met less often by itself than others are.

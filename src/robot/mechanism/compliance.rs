@@ -8,7 +8,9 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// Motor and link, held together by a spring that gives by `compliance` and by a damper of `damping_ratio` times the
 /// critical damping of the two against each other. The motor is driven and has the joint's viscous friction, gravity pulls
 /// at the link. In the form `on_motor` the encoder is on the motor and the link has `link_share` of the inertia; in the form
-/// `on_link` the encoder is on the link and the motor has `motor_share`. In the forms that end in `_hardening` the spring gets
+/// `on_link` the encoder is on the link and the motor has `motor_share`. Dry friction that other laws add is that of the mass with the
+/// encoder; in the form `on_link_motor_friction`, where the motor has `rubbing_motor_share`, it is the motor's, as that of a gear is, and
+/// what creeps there holds (friction that is an effort, as that of a form `smooth` or `presliding`, stays where it is). In the forms that end in `_hardening` the spring gets
 /// stiffer as it twists, and is twice as stiff at `hardening_twist`: torque (1 + (twist / hardening_twist)^2). At first the spring is
 /// bent as it is where both move as one, or straight where they rest and neither holds the other.
 ///
@@ -17,6 +19,9 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// stiffness of harmonic drives, Tuttle & Seering, IEEE Transactions on Robotics and Automation 12 (1996).
 #[derive(Debug, Clone, Copy)]
 pub struct Compliance;
+
+/// Number of the form whose dry friction is the motor's.
+const MOTOR_FRICTION: usize = 4;
 
 /// What moves by less than this part of the swing that a shaft makes when it is let go rests.
 const RESTS: f64 = 0.1;
@@ -58,7 +63,12 @@ impl<P: Mover> Mechanism<P> for Compliance {
             Form { name: "on_link", parameters: parameters("motor_share", false) },
             Form { name: "on_motor_hardening", parameters: parameters("link_share", true) },
             Form { name: "on_link_hardening", parameters: parameters("motor_share", true) },
+            Form { name: "on_link_motor_friction", parameters: parameters("rubbing_motor_share", false) },
         ]
+    }
+
+    fn beside(&self, form: usize) -> &'static [&'static str] {
+        if form == MOTOR_FRICTION { &["coulomb_friction", "stribeck_friction", "load_friction"] } else { &[] }
     }
 
     /// A transmission that gives swings, as metal and belts do; what creeps back is not elastic.
@@ -71,14 +81,16 @@ impl<P: Mover> Mechanism<P> for Compliance {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let hardens = matches!(form, 2 | 3);
         let shaft = Shaft {
             compliance: thetas.row(0).to_vec(),
             share: thetas.row(1).to_vec(),
             damping_ratio: thetas.row(2).to_vec(),
-            hardening_twist: if form < 2 { vec![f64::INFINITY; thetas.lanes()] } else { thetas.row(3).to_vec() },
+            hardening_twist: if hardens { thetas.row(3).to_vec() } else { vec![f64::INFINITY; thetas.lanes()] },
+            motor_friction: form == MOTOR_FRICTION,
             second: vec![None; thetas.lanes()],
         };
-        if form.is_multiple_of(2) { Box::new(OnMotor(shaft)) } else { Box::new(OnLink(shaft)) }
+        if matches!(form, 0 | 2) { Box::new(OnMotor(shaft)) } else { Box::new(OnLink(shaft)) }
     }
 }
 
@@ -90,6 +102,8 @@ struct Shaft {
     damping_ratio: Vec<f64>,
     /// Where it is twice as stiff; infinite where it is as stiff everywhere.
     hardening_twist: Vec<f64>,
+    /// Whether dry friction is that of the mass without an encoder.
+    motor_friction: bool,
     second: Vec<Option<SecondMass>>,
 }
 
@@ -132,7 +146,9 @@ impl Shaft {
             let stiffness = 1.0 / compliance;
             let second = match &mut self.second[lane] {
                 Some(second) => {
-                    second.arrive(first.velocity);
+                    if !self.motor_friction {
+                        second.arrive(first.velocity);
+                    }
                     second
                 }
                 None => {
@@ -155,12 +171,27 @@ impl Shaft {
                 rate: 0.5 * damping + spring_inertia(tangent, reduced, tick.step) / tick.step,
             };
             let sides = sides(lane, state, midway);
-            let load = Load { inertia: share * whole, effort: sides.second, damping: sides.damping, dry_friction: 0.0 };
-            let (effort, inertia) = second.couple(tick.step, first.velocity, load, coupling);
             let push = P::push(effect);
+            let dry_friction = if self.motor_friction { push.without_dry_friction() } else { 0.0 };
+            let load = Load { inertia: share * whole, effort: sides.second, damping: sides.damping, dry_friction };
+            let (effort, inertia) = second.couple(tick.step, first.velocity, load, coupling);
             push.effort += effort - sides.misplaced;
             push.inertia += inertia - share * whole;
             push.damping -= sides.damping;
+        }
+    }
+}
+
+impl Shaft {
+    /// Ends the step before where dry friction is the second mass's, for its laws to see how fast that moves.
+    fn show<P: Mover>(&mut self, states: &[P::State], effects: &mut [P::Effect]) {
+        let lanes = self.second.iter_mut().zip(&self.compliance).zip(states).zip(effects);
+        for (((second, compliance), state), effect) in lanes {
+            if let Some(second) = second.as_mut().filter(|_| *compliance > 0.0) {
+                let velocity = P::motion(state).velocity;
+                second.arrive(velocity);
+                P::push(effect).ahead = second.motion.velocity - velocity;
+            }
         }
     }
 }
@@ -212,6 +243,14 @@ struct OnLink(Shaft);
 impl<P: Mover> Law<P> for OnLink {
     fn change(&mut self, change: &LaneChange<'_>) {
         self.0.change(change);
+    }
+
+    fn late(&self) -> bool {
+        self.0.motor_friction
+    }
+
+    fn prepare(&mut self, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        self.0.show::<P>(scene.states, effects);
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
@@ -308,6 +347,6 @@ mod tests {
         let sought = Mechanism::<Joint>::sought(&Compliance, &Typical::default());
         let ratios: Vec<&Parameter> =
             sought.iter().flat_map(|f| &f.parameters).filter(|p| p.name == "damping_ratio").collect();
-        assert!(ratios.len() == 4 && ratios.iter().all(|p| p.upper < 1.0 && p.starts.iter().all(|s| *s < p.upper)));
+        assert!(ratios.len() == 5 && ratios.iter().all(|p| p.upper < 1.0 && p.starts.iter().all(|s| *s < p.upper)));
     }
 }

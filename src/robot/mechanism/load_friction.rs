@@ -171,12 +171,14 @@ impl<P: Mover> Law<P> for StribeckGears {
         for (lane, (effect, state)) in effects.iter_mut().zip(scene.states).enumerate() {
             let (drive, external) = efforts(tick, scene, lane, state);
             let scale = self.velocity[lane];
-            let ratio = P::motion(state).velocity.abs() / scale;
-            let sticking = (-ratio * ratio).exp() * self.sticking.friction(lane, drive, external);
-            let inertia = P::inertia(scene.dynamics, lane, state);
             let push = P::push(effect);
+            let ratio = (P::motion(state).velocity + push.ahead).abs() / scale;
+            let sticking = (-ratio * ratio).exp() * self.sticking.friction(lane, drive, external);
             push.dry_friction += self.sliding.friction(lane, drive, external) + sticking;
-            push.inertia -= falling(2.0 * ratio / scale * sticking, inertia, tick.step);
+            if push.ahead == 0.0 {
+                let inertia = P::inertia(scene.dynamics, lane, state);
+                push.inertia -= falling(2.0 * ratio / scale * sticking, inertia, tick.step);
+            }
         }
     }
 }

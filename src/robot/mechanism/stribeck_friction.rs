@@ -104,11 +104,14 @@ impl Friction {
         let parameters = self.torque.iter().zip(&self.excess).zip(&self.fading);
         let lanes = effects.iter_mut().zip(scene.states).zip(parameters).enumerate();
         for (lane, ((effect, state), ((torque, excess), per_velocity))) in lanes {
-            let (left, fall) = fading(P::motion(state).velocity.abs() * per_velocity);
             let push = P::push(effect);
+            let (left, fall) = fading((P::motion(state).velocity + push.ahead).abs() * per_velocity);
             push.dry_friction += torque + excess * left;
-            let inertia = P::inertia(scene.dynamics, lane, state);
-            push.inertia -= falling(excess * per_velocity * fall, inertia, tick.step);
+            // Friction of another mass takes nothing off this one's.
+            if push.ahead == 0.0 {
+                let inertia = P::inertia(scene.dynamics, lane, state);
+                push.inertia -= falling(excess * per_velocity * fall, inertia, tick.step);
+            }
         }
     }
 }

@@ -53,6 +53,7 @@ pub(super) fn signatures<T: Twin>(
     let (wider, plain): (Vec<usize>, Vec<usize>) = (0..inquiry.candidates.len())
         .filter(|number| !inquiry.candidates[*number].finishing && wanted(&inquiry.candidates[*number]))
         .filter(|number| !has.contains(&inquiry.candidates[*number].about.name))
+        .filter(|number| differs(&inquiry.candidates[*number], &has))
         .partition(|number| inquiry.candidates[*number].general);
     let mut screened: Vec<Screened> =
         plain.into_par_iter().filter_map(|number| screen(inquiry, parent, number, &grounds)).collect();
@@ -60,6 +61,11 @@ pub(super) fn signatures<T: Twin>(
         wider.into_iter().filter_map(|number| widened(inquiry.candidates, number, &screened)).collect();
     screened.extend(of_wider);
     screened
+}
+
+/// Whether `candidate` says anything else than a plainer form of its mechanism beside what is there.
+fn differs(candidate: &Candidate, has: &[&str]) -> bool {
+    candidate.beside.is_empty() || candidate.beside.iter().any(|other| has.contains(other))
 }
 
 /// A wider law, of which the form of its mechanism that screening likes best is one case: it begins as that does, and what it has beyond
@@ -371,7 +377,16 @@ mod tests {
         let bounds = parameters.iter().map(|p| [p.lower, p.upper]).collect();
         let form = Form { name: if general { "wide" } else { "plain" }, parameters };
         let form_index = usize::from(general);
-        Candidate { about, form, form_index, finishing: false, general, ages: false, seldom: false, bounds }
+        let (finishing, beside, ages, seldom) = (false, &[][..], false, false);
+        Candidate { about, form, form_index, finishing, general, beside, ages, seldom, bounds }
+    }
+
+    #[test]
+    fn a_form_that_differs_beside_others_alone_is_tried_beside_these() {
+        let plain = candidate(false, Vec::new());
+        let rubbing = Candidate { beside: &["friction", "gears"], ..plain.clone() };
+        assert!(differs(&plain, &[]) && differs(&plain, &["spring"]));
+        assert!(!differs(&rubbing, &[]) && !differs(&rubbing, &["spring"]) && differs(&rubbing, &["spring", "gears"]));
     }
 
     #[test]
