@@ -271,6 +271,7 @@ impl ScriptedSimulator {
                 form_index: 0,
                 finishing: false,
                 general: false,
+                beside: &[],
                 ages: false,
                 seldom: false,
             })
