@@ -163,6 +163,12 @@ fn a_mechanism_that_keeps_no_promise_is_tried_in_its_other_forms() {
     assert_eq!(names(&tried(51, 39)), ["saturation"]);
 }
 
+/// Cogging with a wave of half the length besides: what that left looked like more than a spring could explain.
+#[test]
+fn teeth_with_harmonics_do_not_hide_a_spring() {
+    assert_eq!(names(&tried(61, 41)), ["cogging", "cubic_stiffness"]);
+}
+
 /// A drag of one sigma beside a spring of fifteen: it explains less than a thousandth of all, and as much where it was not fitted.
 #[test]
 fn what_is_decisive_is_named_however_small_a_share_it_has() {

@@ -10,9 +10,10 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// at the link. In the form `on_motor` the encoder is on the motor and the link has `link_share` of the inertia; in the form
 /// `on_link` the encoder is on the link and the motor has `motor_share`. Dry friction that other laws add is that of the mass with the
 /// encoder; in the form `on_link_motor_friction`, where the motor has `rubbing_motor_share`, it is the motor's, as that of a gear is, and
-/// what creeps there holds (friction that is an effort, as that of a form `smooth` or `presliding`, stays where it is). In the forms that end in `_hardening` the spring gets
-/// stiffer as it twists, and is twice as stiff at `hardening_twist`: torque (1 + (twist / hardening_twist)^2). At first the spring is
-/// bent as it is where both move as one, or straight where they rest and neither holds the other.
+/// what creeps there holds (friction that is an effort, as that of a form `smooth` or `presliding`, stays where it is). In the forms that
+/// end in `_hardening` the spring gets stiffer as it twists, and is twice as stiff at `hardening_twist`: torque
+/// (1 + (twist / hardening_twist)^2). At first the spring is bent as it is where both move as one, or straight where they rest and
+/// neither holds the other.
 ///
 /// Source: Spong, "Modeling and control of elastic joint robots", ASCE Journal of Dynamic Systems, Measurement, and Control
 /// 109 (1987); De Luca & Book, "Robots with flexible elements", *Springer Handbook of Robotics* (2016), section 11.1; a cubic
