@@ -2,7 +2,7 @@
 
 use super::coulomb_friction::{hardly_giving, presliding_angle};
 use super::drawn::{Drawn, moved, soft};
-use super::stribeck_friction::falling;
+use super::stribeck_friction::rub;
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
@@ -174,11 +174,9 @@ impl<P: Mover> Law<P> for StribeckGears {
             let push = P::push(effect);
             let ratio = (P::motion(state).velocity + push.ahead).abs() / scale;
             let sticking = (-ratio * ratio).exp() * self.sticking.friction(lane, drive, external);
-            push.dry_friction += self.sliding.friction(lane, drive, external) + sticking;
-            if push.ahead == 0.0 {
-                let inertia = P::inertia(scene.dynamics, lane, state);
-                push.inertia -= falling(2.0 * ratio / scale * sticking, inertia, tick.step);
-            }
+            let friction = self.sliding.friction(lane, drive, external) + sticking;
+            let inertia = || P::inertia(scene.dynamics, lane, state);
+            rub(push, friction, 2.0 * ratio / scale * sticking, inertia, tick.step);
         }
     }
 }

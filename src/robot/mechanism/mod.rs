@@ -186,6 +186,28 @@ mod tests {
         assert_eq!(of_rates(&recording), 0);
     }
 
+    /// A shaft with dry friction of its motor differs from one with friction of its link where there is friction: found, or modelled.
+    #[test]
+    fn what_differs_beside_friction_alone_is_sought_at_once_where_friction_is_modelled() {
+        let recording = Recording {
+            name: "swing".into(),
+            time: (0..100).map(|i| f64::from(i) * 4e-3).collect(),
+            stimulus: Commands(vec![1.0; 100]),
+            measured: vec![],
+        };
+        let twin = Assembly::new(Joint::new(Axis::Rotary, [1.0; 4], [0.2; 4]), MECHANISMS);
+        let beside = |twin: &Assembly<Joint>| {
+            let candidates = twin.candidates(std::slice::from_ref(&recording));
+            candidates.iter().find(|c| c.form.name == "on_link_motor_friction").map(|c| c.beside)
+        };
+        assert!(beside(&twin).is_some_and(|others| others.contains(&"load_friction")));
+        let stiff = Mechanism::<Joint>::forms(&Stiffness, &Default::default())[0].parameters.clone();
+        let twin = twin.with_mechanism(&Stiffness, 0, stiff);
+        assert!(beside(&twin).is_some_and(|others| !others.is_empty()));
+        let rubbing = Mechanism::<Joint>::forms(&LoadFriction, &Default::default())[0].parameters.clone();
+        assert_eq!(beside(&twin.with_mechanism(&LoadFriction, 0, rubbing)), Some::<&[&str]>(&[]));
+    }
+
     /// A run that starts in the middle of a recording, from the state the whole had there, is as warm as the whole.
     #[test]
     fn heat_is_not_lost_between_windows() {

@@ -2,7 +2,7 @@
 
 use super::coulomb_friction::{hardly_giving, presliding_angle};
 use super::drawn::{Drawn, moved, soft};
-use crate::robot::Mover;
+use crate::robot::{Mover, Push};
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// Dry friction of `torque + excess exp(-(v / stribeck_velocity)^2)`; in the form `tustin`,
@@ -106,13 +106,19 @@ impl Friction {
         for (lane, ((effect, state), ((torque, excess), per_velocity))) in lanes {
             let push = P::push(effect);
             let (left, fall) = fading((P::motion(state).velocity + push.ahead).abs() * per_velocity);
-            push.dry_friction += torque + excess * left;
-            // Friction of another mass takes nothing off this one's.
-            if push.ahead == 0.0 {
-                let inertia = P::inertia(scene.dynamics, lane, state);
-                push.inertia -= falling(excess * per_velocity * fall, inertia, tick.step);
-            }
+            let inertia = || P::inertia(scene.dynamics, lane, state);
+            rub(push, torque + excess * left, excess * per_velocity * fall, inertia, tick.step);
         }
+    }
+}
+
+/// Adds dry `friction` [N m] that falls by `fall` [N m s/rad] with speed, to a coordinate of `inertia` [kg m^2].
+#[inline]
+pub(super) fn rub(push: &mut Push, friction: f64, fall: f64, inertia: impl FnOnce() -> f64, step: f64) {
+    push.dry_friction += friction;
+    // Friction of another mass takes nothing off this one's.
+    if push.ahead == 0.0 {
+        push.inertia -= falling(fall, inertia(), step);
     }
 }
 
@@ -121,7 +127,7 @@ impl Friction {
 /// Dry friction is that of the start of a step; that it falls on the way counts like an inertia that is not there: with it
 /// the friction is that of the middle of the step, to second order. A fall too steep for the step to follow counts for less.
 #[inline]
-pub(super) fn falling(fall: f64, inertia: f64, step: f64) -> f64 {
+fn falling(fall: f64, inertia: f64, step: f64) -> f64 {
     (0.5 * step * fall).min(0.25 * inertia)
 }
 
