@@ -1,5 +1,6 @@
 //! An actuator whose output cannot change as fast as its command.
 
+use super::decay::gained;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Seed, Site, Thetas, Tick, Typical};
 
 /// `|du/dt| <= rate`: the output ramps towards a command that holds until it reaches it.
@@ -9,6 +10,10 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 ///
 /// A recording does not tell what was in force before its first command: with `rate` that command, as where it is cut out of what
 /// went on; in the form `from_rest`, with `slew_rate`, nothing, as where a driver is switched on with it.
+///
+/// A limit within a loop is met by its error: in the forms `closed_loop` and `closed_loop_from_rest`,
+/// `du/dt = (u_command - u) / answer_time` as far as that is within `rate`, so that small changes are followed with a lag. It is the lag of the
+/// limited loop itself, and short: a longer one is an `actuator_lag` beside the limit.
 ///
 /// Source: Klyde, McRuer & Myers, "Pilot-induced oscillation analysis and prediction with actuator rate limiting", Journal
 /// of Guidance, Control, and Dynamics 20 (1997).
@@ -24,7 +29,7 @@ where
             name: "rate_limit",
             site: Site::Command,
             title: "a limit to how fast the actuator's output changes",
-            law: "|du/dt| <= rate; from_rest: from u = 0",
+            law: "|du/dt| <= rate; closed_loop: du/dt = (u_command - u) / answer_time within that; from_rest: from u = 0",
             source: "Klyde, McRuer & Myers, Journal of Guidance, Control, and Dynamics 20 (1997)",
             remedy: "look for a ramp set in the drive; command no faster changes, or limit their rate in the simulator too",
             contains: &[],
@@ -38,9 +43,17 @@ where
             let rate = Parameter::new(name, "command/s", f64::INFINITY).within(0.0, f64::INFINITY);
             vec![rate.starting_at(&starts)]
         };
+        let answer = Parameter::new("answer_time", "s", 0.0).within(0.0, LONGEST_ANSWER).starting_at(&[0.3 * LONGEST_ANSWER]);
+        let within_a_loop = |name| rate(name).into_iter().chain([answer.clone()]).collect();
         let mut forms = Form::only(rate("rate"));
         forms.push(Form { name: "from_rest", parameters: rate("slew_rate") });
+        forms.push(Form { name: "closed_loop", parameters: within_a_loop("rate") });
+        forms.push(Form { name: "closed_loop_from_rest", parameters: within_a_loop("slew_rate") });
         forms
+    }
+
+    fn general(&self, form: usize) -> bool {
+        form >= CLOSED_LOOP
     }
 
     /// Long enough for a ramp of some steepness to reach its command, after which all that was before is forgotten.
@@ -49,10 +62,19 @@ where
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let before = if form == 0 { None } else { Some(0.0) };
-        Box::new(Ramp { rate: thetas.row(0).to_vec(), before, output: vec![before; thetas.lanes()] })
+        let before = if form.is_multiple_of(2) { None } else { Some(0.0) };
+        let ramp = Ramp { rate: thetas.row(0).to_vec(), before, output: vec![before; thetas.lanes()] };
+        if form < CLOSED_LOOP {
+            return Box::new(ramp);
+        }
+        Box::new(ClosedLoop { ramp, answer_time: thetas.row(1).to_vec() })
     }
 }
+
+/// The forms from this one on are of a limit within a loop.
+const CLOSED_LOOP: usize = 2;
+/// The slowest answer of such a loop [s].
+const LONGEST_ANSWER: f64 = 0.01;
 
 #[derive(Clone)]
 struct Ramp {
@@ -91,6 +113,51 @@ where
     }
 }
 
+/// A ramp towards a command that is slowed down where it comes near.
+#[derive(Clone)]
+struct ClosedLoop {
+    ramp: Ramp,
+    answer_time: Vec<f64>,
+}
+
+impl<P: Plant> Law<P> for ClosedLoop
+where
+    P::Command: AsMut<f64>,
+{
+    fn change(&mut self, change: &LaneChange<'_>) {
+        Law::<P>::change(&mut self.ramp, change);
+        change.parameter(1, &mut self.answer_time);
+    }
+
+    fn shape(&mut self, tick: Tick, commands: &mut [P::Command]) {
+        let Ramp { rate, output, .. } = &mut self.ramp;
+        let lanes = commands.iter_mut().zip(rate).zip(&self.answer_time).zip(output);
+        for (((command, rate), answer_time), output) in lanes {
+            let u = command.as_mut();
+            let start = output.unwrap_or(*u);
+            let [left, mean] = left_over(*u - start, *rate, *answer_time, tick.step);
+            *output = Some(*u - left);
+            *u -= mean;
+        }
+    }
+}
+
+/// What is left of the way `error` to a command that holds, after `step` [s] and on average over it.
+///
+/// First it goes at the full rate, until it has come as near as the loop answers within that; then it decays.
+fn left_over(error: f64, rate: f64, answer_time: f64, step: f64) -> [f64; 2] {
+    let way = error.abs();
+    if way == 0.0 || step <= 0.0 {
+        return [0.0; 2];
+    }
+    let near = if answer_time > 0.0 { rate * answer_time } else { 0.0 };
+    let ramping = if way > near { ((way - near) / rate).min(step) } else { 0.0 };
+    let (ramped, gained) =
+        if ramping < step { (way.min(near), gained(step - ramping, answer_time)) } else { (way - rate * step, 0.0) };
+    let sum = 0.5 * (way + ramped) * ramping + ramped * answer_time * gained;
+    [ramped * (1.0 - gained), sum / step].map(|left| left.copysign(error))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::wire::shaped;
@@ -119,6 +186,30 @@ mod tests {
         let out = shaped(&RateLimit, 1, &[&[2.0], &[f64::INFINITY]], 0.25, &[1.0; 4]);
         assert_eq!(out, [[0.25, 0.75, 1.0, 1.0], [1.0; 4]]);
         assert_eq!(shaped(&RateLimit, 0, &[&[2.0]], 0.25, &[1.0; 4]), [[1.0; 4]]);
+    }
+
+    /// Integrated in 10,000 steps a tick.
+    #[test]
+    fn within_a_loop_it_goes_at_the_full_rate_until_it_is_near_and_then_as_a_lag() {
+        let (step, fine) = (0.02, 10_000);
+        let commands: Vec<f64> = (0..40).map(|i| [0.0, 1.0, 0.97, -0.4][i / 10]).collect();
+        let out = shaped(&RateLimit, 2, &[&[7.0, 0.008], &[f64::INFINITY, 0.008], &[7.0, 0.0]], step, &commands);
+        for (lane, (rate, answer_time)) in [(7.0, 0.008), (f64::INFINITY, 0.008)].into_iter().enumerate() {
+            let mut u = commands[0];
+            for (i, command) in commands.iter().enumerate() {
+                let mut mean = 0.0;
+                for _ in 0..fine {
+                    let before = u;
+                    u += step / f64::from(fine) * ((command - u) / answer_time).clamp(-rate, rate);
+                    mean += 0.5 * (before + u) / f64::from(fine);
+                }
+                assert!((out[lane][i] - mean).abs() < 2e-4, "{lane}, tick {i}: {}, not {mean}", out[lane][i]);
+            }
+        }
+        let ramp = &shaped(&RateLimit, 0, &[&[7.0]], step, &commands)[0];
+        assert!(out[2].iter().zip(ramp).all(|(a, b)| (a - b).abs() < 1e-12), "what answers at once ramps to the end");
+        let begun = shaped(&RateLimit, 3, &[&[1.0, 0.01], &[f64::INFINITY, 0.0]], 0.25, &[1.0; 8]);
+        assert!(begun[0][0] == 0.125 && begun[0][7] > 0.999 && begun[1] == [1.0; 8]);
     }
 
     #[test]
