@@ -39,7 +39,7 @@ const SWAPS: usize = 4;
 /// Less than this part of the first misfit is little: ...
 const LITTLE: f64 = 0.01;
 /// ... a further mechanism that explains little must do so where it was not fitted, and one that is no more likely than this beside
-/// its rivals is not worth a name ...
+/// its rivals is not worth a name, unless it is beyond doubt that one of them is there ...
 const ANYBODYS: f64 = 0.5;
 /// ... where what is left without it has at most this many times the mean square of the noise.
 const HARDLY_LEFT: f64 = 2.0;
@@ -87,7 +87,9 @@ fn anybodys<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, places:
         let contained = (0..places.len()).any(|other| about(other).contains.contains(&about(*place).name));
         let of_another = contained && hardly_left && sure(places, *place) < LIKELY_BESIDE_ITS_LAW;
         let sampled = inquiry.twin.clock() != Clock::Event;
-        little && hardly_left && likely < ANYBODYS
+        // One of several delays may well be there though nobody can tell which.
+        let there = || sampled && beyond_doubt(inquiry, less, whole, NO_ERROR_OF_FORM) && carries_over(inquiry, less, whole);
+        little && hardly_left && likely < ANYBODYS && !there()
             || sampled && hardly_left && explained < OFF_BY && !beyond_doubt(inquiry, less, whole, NO_FORM_AT_ALL)
             || likely < HARDLY_IT
             || of_another
