@@ -327,3 +327,20 @@ fn a_fit_steps_freely_while_it_leads_anywhere() {
 fn what_no_form_is_off_by_is_named_however_small_a_share_it_has() {
     assert_eq!(names(&tried(71, 122)), ["observation_delay", "scale"]);
 }
+
+/// A limit within a loop follows small changes with a lag, for which a second delay was named.
+#[test]
+fn what_a_limited_loop_answers_late_is_no_second_effect() {
+    let trial = tried(72, 94);
+    assert_eq!((names(&trial), trial.verdict), (vec!["rate_limit"], Verdict::Named));
+}
+
+/// A small delay of the command beside an end stop: an actuator's lag and a late sensor do as well, and it was dropped for that.
+#[test]
+fn one_of_several_delays_is_there_though_nobody_can_tell_which() {
+    let trial = tried(71, 37);
+    let late = trial.found.iter().find(|found| found.mechanism != "end_stop").unwrap();
+    let it = |name: &str| late.mechanism == name || late.rivals.iter().any(|rival| rival == name);
+    assert!(it("command_delay") && it("actuator_lag") && it("observation_delay"), "{:?}", trial.found);
+    assert_eq!((trial.found.len(), trial.verdict), (2, Verdict::Ambiguous));
+}

@@ -11,7 +11,7 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 /// A recording does not tell what was in force before its first command: with `rate` that command, as where it is cut out of what
 /// went on; in the form `from_rest`, with `slew_rate`, nothing, as where a driver is switched on with it.
 ///
-/// A limit within a loop is met by its error: in the forms `closed_loop` and `closed_loop_from_rest`,
+/// A limit within a loop is met by its error: in the forms `answering` and `answering_from_rest`,
 /// `du/dt = (u_command - u) / answer_time` as far as that is within `rate`, so that small changes are followed with a lag. It is the lag of the
 /// limited loop itself, and short: a longer one is an `actuator_lag` beside the limit.
 ///
@@ -29,7 +29,7 @@ where
             name: "rate_limit",
             site: Site::Command,
             title: "a limit to how fast the actuator's output changes",
-            law: "|du/dt| <= rate; closed_loop: du/dt = (u_command - u) / answer_time within that; from_rest: from u = 0",
+            law: "|du/dt| <= rate; answering: du/dt = (u_command - u) / answer_time within that; from_rest: from u = 0",
             source: "Klyde, McRuer & Myers, Journal of Guidance, Control, and Dynamics 20 (1997)",
             remedy: "look for a ramp set in the drive; command no faster changes, or limit their rate in the simulator too",
             contains: &[],
@@ -43,17 +43,18 @@ where
             let rate = Parameter::new(name, "command/s", f64::INFINITY).within(0.0, f64::INFINITY);
             vec![rate.starting_at(&starts)]
         };
-        let answer = Parameter::new("answer_time", "s", 0.0).within(0.0, LONGEST_ANSWER).starting_at(&[0.3 * LONGEST_ANSWER]);
+        let answer =
+            Parameter::new("answer_time", "s", 0.0).within(0.0, LONGEST_ANSWER).starting_at(&[0.3 * LONGEST_ANSWER]);
         let within_a_loop = |name| rate(name).into_iter().chain([answer.clone()]).collect();
         let mut forms = Form::only(rate("rate"));
         forms.push(Form { name: "from_rest", parameters: rate("slew_rate") });
-        forms.push(Form { name: "closed_loop", parameters: within_a_loop("rate") });
-        forms.push(Form { name: "closed_loop_from_rest", parameters: within_a_loop("slew_rate") });
+        forms.push(Form { name: "answering", parameters: within_a_loop("rate") });
+        forms.push(Form { name: "answering_from_rest", parameters: within_a_loop("slew_rate") });
         forms
     }
 
     fn general(&self, form: usize) -> bool {
-        form >= CLOSED_LOOP
+        form >= ANSWERING
     }
 
     /// Long enough for a ramp of some steepness to reach its command, after which all that was before is forgotten.
@@ -64,15 +65,15 @@ where
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
         let before = if form.is_multiple_of(2) { None } else { Some(0.0) };
         let ramp = Ramp { rate: thetas.row(0).to_vec(), before, output: vec![before; thetas.lanes()] };
-        if form < CLOSED_LOOP {
+        if form < ANSWERING {
             return Box::new(ramp);
         }
-        Box::new(ClosedLoop { ramp, answer_time: thetas.row(1).to_vec() })
+        Box::new(Answering { ramp, answer_time: thetas.row(1).to_vec() })
     }
 }
 
 /// The forms from this one on are of a limit within a loop.
-const CLOSED_LOOP: usize = 2;
+const ANSWERING: usize = 2;
 /// The slowest answer of such a loop [s].
 const LONGEST_ANSWER: f64 = 0.01;
 
@@ -115,12 +116,12 @@ where
 
 /// A ramp towards a command that is slowed down where it comes near.
 #[derive(Clone)]
-struct ClosedLoop {
+struct Answering {
     ramp: Ramp,
     answer_time: Vec<f64>,
 }
 
-impl<P: Plant> Law<P> for ClosedLoop
+impl<P: Plant> Law<P> for Answering
 where
     P::Command: AsMut<f64>,
 {
