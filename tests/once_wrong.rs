@@ -328,11 +328,14 @@ fn what_no_form_is_off_by_is_named_however_small_a_share_it_has() {
     assert_eq!(names(&tried(71, 122)), ["observation_delay", "scale"]);
 }
 
-/// A limit within a loop follows small changes with a lag, for which a second delay was named.
+/// A limit within a loop follows small changes with a lag, for which a second delay was named; a housing warms after its winding, for which a
+/// change of payload was.
 #[test]
-fn what_a_limited_loop_answers_late_is_no_second_effect() {
-    let trial = tried(72, 94);
-    assert_eq!((names(&trial), trial.verdict), (vec!["rate_limit"], Verdict::Named));
+fn what_the_actuator_has_besides_is_no_second_effect() {
+    for (seed, index, right) in [(72, 94, "rate_limit"), (73, 78, "thermal_derating")] {
+        let trial = tried(seed, index);
+        assert_eq!((names(&trial), trial.verdict), (vec![right], Verdict::Named), "{seed}/{index}");
+    }
 }
 
 /// A small delay of the command beside an end stop: an actuator's lag and a late sensor do as well, and it was dropped for that.

@@ -12,7 +12,12 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 /// much is lost in the first second at a command of 1; a command that holds for long loses `strength time_constant u^2`.
 /// An infinite time constant never cools. The heat is that of the command as it reaches this law.
 ///
-/// Heat is solved exactly over a tick for a command that holds; the gain is that of the mean of the heat at its ends.
+/// A winding sheds its heat into a housing, which warms in turn: in the forms `linear_two_bodies` and `reciprocal_two_bodies`,
+/// `dh/dt = strength u^2 - (h - g) / time_constant` and `dg/dt = (housing_share (h - g) - g) / housing_time_constant`, with
+/// `housing_share` the thermal resistance from housing to air in units of that from winding to housing. Catalogues of motors give
+/// both time constants and both resistances.
+///
+/// Heat is solved exactly over a tick for a command that holds (with a housing to second order); the gain is that of the mean of the heat at its ends.
 ///
 /// Source: Joule heat into one lumped capacity, Trujillo & Cutkosky, "Thermally constrained motor operation for a climbing
 /// robot", ICRA 2009; what it does to magnets and copper, Hendershot & Miller, *Design of Brushless Permanent-Magnet
@@ -29,7 +34,7 @@ where
             name: "thermal_derating",
             site: Site::Command,
             title: "an actuator that weakens as it warms",
-            law: "dh/dt = strength u^2 - h / time_constant; linear: u -> max(0, 1 - h) u; reciprocal: u -> u / (1 + h)",
+            law: "dh/dt = strength u^2 - h / time_constant; linear: u -> max(0, 1 - h) u; reciprocal: u -> u / (1 + h); two_bodies: h - g for h, dg/dt = (housing_share (h - g) - g) / housing_time_constant",
             source: "Trujillo & Cutkosky, ICRA 2009; Hendershot & Miller, Design of Brushless PM Machines (2010)",
             remedy: "measure the torque of a warm actuator; cool it, rest it, or let the simulator's gain fall with the heat",
             contains: &[],
@@ -43,11 +48,25 @@ where
         let times = [0.15, 0.6].map(|part| part * duration);
         // The shortest that a winding has; below, the gain would fall within a swing.
         let time = Parameter::new("time_constant", "s", f64::INFINITY).within(0.1, f64::INFINITY).starting_at(&times);
-        let form = |name, strength| {
+        let winding = |strength| {
             let strength = Parameter::new(strength, "1/(command^2 s)", 0.0).within(0.0, f64::INFINITY);
-            Form { name, parameters: vec![strength.starting_at(&strengths), time.clone()] }
+            vec![strength.starting_at(&strengths), time.clone()]
         };
-        vec![form("linear", "strength"), form("reciprocal", "reciprocal_strength")]
+        let housing = [
+            Parameter::new("housing_time_constant", "s", f64::INFINITY).within(0.1, f64::INFINITY).starting_at(&[duration]),
+            Parameter::new("housing_share", "", 0.0).within(0.0, 20.0).starting_at(&[0.5]),
+        ];
+        let two_bodies = |strength| winding(strength).into_iter().chain(housing.clone()).collect();
+        vec![
+            Form { name: "linear", parameters: winding("strength") },
+            Form { name: "reciprocal", parameters: winding("reciprocal_strength") },
+            Form { name: "linear_two_bodies", parameters: two_bodies("strength") },
+            Form { name: "reciprocal_two_bodies", parameters: two_bodies("reciprocal_strength") },
+        ]
+    }
+
+    fn general(&self, form: usize) -> bool {
+        form >= TWO_BODIES
     }
 
     /// What weakens within a part of a second and recovers as soon is not warm: windings of the smallest motors take seconds.
@@ -71,11 +90,14 @@ where
             time_constant: thetas.row(1).to_vec(),
             lost: vec![0.0; thetas.lanes()],
             decay: Decay::default(),
+            housing: (form >= TWO_BODIES).then(|| Housing::of(thetas)),
         };
-        if form == 0 { Box::new(Magnets(heat)) } else { Box::new(Copper(heat)) }
+        if form.is_multiple_of(2) { Box::new(Magnets(heat)) } else { Box::new(Copper(heat)) }
     }
 }
 
+/// The forms from this one on have a housing.
+const TWO_BODIES: usize = 2;
 /// The shortest time constant of a winding that is sought [s].
 const SHORTEST: f64 = 0.5;
 
@@ -86,6 +108,7 @@ struct Heat {
     /// `h` at the start of the tick.
     lost: Vec<f64>,
     decay: Decay,
+    housing: Option<Housing>,
 }
 
 impl Heat {
@@ -94,19 +117,72 @@ impl Heat {
         change.parameter(1, &mut self.time_constant);
         change.memory(&mut self.lost);
         self.decay.change(change, &self.time_constant);
+        if let Some(housing) = &mut self.housing {
+            housing.change(change);
+        }
     }
 
     /// Takes up what the commands leave in the tick, and gives each the gain that the mean heat over the tick leaves it.
     fn pass<C: AsMut<f64>>(&mut self, tick: Tick, commands: &mut [C], gain: impl Fn(f64) -> f64) {
         let gained = self.decay.over(tick.step, &self.time_constant);
         let parameters = self.strength.iter().zip(&self.time_constant).zip(gained);
-        for ((command, lost), ((strength, tau), gained)) in commands.iter_mut().zip(&mut self.lost).zip(parameters) {
+        let lanes = commands.iter_mut().zip(&mut self.lost).zip(parameters).enumerate();
+        for (lane, ((command, lost), ((strength, tau), gained))) in lanes {
             let u = command.as_mut();
             let seconds = if tau.is_finite() { tau * gained } else { tick.step };
             let start = *lost;
-            *lost += strength * *u * *u * seconds - start * gained;
-            *u *= gain(0.5 * (start + *lost));
+            let housing = self.housing.as_mut().map_or(0.0, |housing| housing.midway(lane, start, tick.step));
+            *lost += strength * *u * *u * seconds - (start - housing) * gained;
+            let mean = 0.5 * (start + *lost);
+            if let Some(housing) = &mut self.housing {
+                housing.warm(lane, mean, tick.step);
+            }
+            *u *= gain(mean);
         }
+    }
+}
+
+/// What a winding sheds its heat into.
+#[derive(Clone)]
+struct Housing {
+    /// How much of the winding's heat it comes to have.
+    part: Vec<f64>,
+    /// Time constant with which it comes to that [s].
+    settling: Vec<f64>,
+    /// `g` at the start of the tick.
+    heat: Vec<f64>,
+    decay: Decay,
+}
+
+impl Housing {
+    fn of(thetas: &Thetas) -> Self {
+        let times = thetas.row(2).iter().zip(thetas.row(3));
+        Self {
+            part: thetas.row(3).iter().map(|share| share / (1.0 + share)).collect(),
+            settling: times.map(|(time, share)| time / (1.0 + share)).collect(),
+            heat: vec![0.0; thetas.lanes()],
+            decay: Decay::default(),
+        }
+    }
+
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.derived(&mut self.part, |values| values[3] / (1.0 + values[3]));
+        change.derived(&mut self.settling, |values| values[2] / (1.0 + values[3]));
+        change.memory(&mut self.heat);
+        self.decay.change(change, &self.settling);
+    }
+
+    /// `g` in the middle of a tick that the winding starts with heat `winding`.
+    fn midway(&mut self, lane: usize, winding: f64, step: f64) -> f64 {
+        let gained = self.decay.over(step, &self.settling)[lane];
+        let half = gained / (1.0 + (1.0 - gained).sqrt());
+        self.heat[lane] + (self.part[lane] * winding - self.heat[lane]) * half
+    }
+
+    /// Goes on by a tick over which the winding has heat `winding` on average.
+    fn warm(&mut self, lane: usize, winding: f64, step: f64) {
+        let gained = self.decay.over(step, &self.settling)[lane];
+        self.heat[lane] += (self.part[lane] * winding - self.heat[lane]) * gained;
     }
 }
 
@@ -199,6 +275,32 @@ mod tests {
             assert!((out[0][count - 1] - (1.0 - STRENGTH * middle)).abs() < 1e-12);
             assert!((out[1][count - 1] - out[0][count - 1]).abs() < 1e-10);
         }
+    }
+
+    /// Integrated by Heun's method in steps a hundredth as long.
+    #[test]
+    fn a_housing_warms_after_its_winding_and_warms_it() {
+        let (step, fine) = (0.05, 100);
+        let [strength, tau, settling, share] = [0.05, 1.5, 6.0, 2.0];
+        let commands: Vec<f64> = (0..600).map(|i| if i < 300 { 2.0 } else { -0.5 }).collect();
+        let lanes: [&[f64]; 3] =
+            [&[strength, tau, settling, share], &[strength, tau, settling, 0.0], &[strength, tau, f64::INFINITY, 3.0]];
+        let out = shaped(&ThermalDerating, 3, &lanes, step, &commands);
+        let slope = |[h, g]: [f64; 2], u: f64| [strength * u * u - (h - g) / tau, (share * (h - g) - g) / settling];
+        let mut heat = [0.0; 2];
+        for (i, u) in commands.iter().enumerate() {
+            let start = heat[0];
+            for _ in 0..fine {
+                let dt = step / f64::from(fine);
+                let first = slope(heat, *u);
+                let second = slope([heat[0] + dt * first[0], heat[1] + dt * first[1]], *u);
+                heat = [0, 1].map(|k| heat[k] + 0.5 * dt * (first[k] + second[k]));
+            }
+            let right = u / (1.0 + 0.5 * (start + heat[0]));
+            assert!((out[0][i] - right).abs() < 2e-5 * u.abs(), "row {i}: {}, not {right}", out[0][i]);
+        }
+        let alone = &shaped(&ThermalDerating, 1, &[&[strength, tau]], step, &commands)[0];
+        assert!(alone == &out[1] && alone == &out[2], "what nothing is shed into stays cold");
     }
 
     #[test]
