@@ -53,8 +53,10 @@ where
             vec![strength.starting_at(&strengths), time.clone()]
         };
         let housing = [
-            Parameter::new("housing_time_constant", "s", f64::INFINITY).within(0.1, f64::INFINITY).starting_at(&[duration]),
-            Parameter::new("housing_share", "", 0.0).within(0.0, 5.0).starting_at(&[0.5]),
+            Parameter::new("housing_time_constant", "s", f64::INFINITY)
+                .within(SHORTEST_OF_HOUSINGS, f64::INFINITY)
+                .starting_at(&[duration.max(SHORTEST_OF_HOUSINGS)]),
+            Parameter::new("housing_share", "", 0.0).within(0.0, MOST_INSULATED).starting_at(&[0.5]),
         ];
         let two_bodies = |strength| winding(strength).into_iter().chain(housing.clone()).collect();
         vec![
@@ -72,14 +74,9 @@ where
     /// What weakens within a part of a second and recovers as soon is not warm: windings of the smallest motors take seconds.
     fn sought(&self, typical: &Typical) -> Vec<Form> {
         let mut forms = Mechanism::<P>::forms(self, typical);
-        for time in forms.iter_mut().flat_map(|form| &mut form.parameters) {
-            let shortest = match time.name.as_ref() {
-                "time_constant" => SHORTEST,
-                "housing_time_constant" => SHORTEST_OF_HOUSINGS,
-                _ => continue,
-            };
-            time.lower = shortest;
-            time.starts.iter_mut().for_each(|start| *start = start.max(shortest));
+        for time in forms.iter_mut().flat_map(|form| &mut form.parameters).filter(|p| p.name == "time_constant") {
+            time.lower = SHORTEST;
+            time.starts.iter_mut().for_each(|start| *start = start.max(SHORTEST));
         }
         forms
     }
@@ -105,8 +102,11 @@ where
 const TWO_BODIES: usize = 2;
 /// The shortest time constant of a winding that is sought [s].
 const SHORTEST: f64 = 0.5;
-/// The same of a housing: one that follows its winding at once makes a winding of another resistance, which no recording tells apart.
+/// The shortest of a housing [s]: one that follows its winding at once makes a winding of another resistance, which no recording tells
+/// apart.
 const SHORTEST_OF_HOUSINGS: f64 = 5.0;
+/// The largest resistance from housing to air, in units of that from winding to housing.
+const MOST_INSULATED: f64 = 20.0;
 
 #[derive(Clone)]
 struct Heat {
@@ -315,8 +315,7 @@ mod tests {
         for duration in [0.3, 20.0] {
             let sought = Mechanism::<Wire>::sought(&ThermalDerating, &Typical { duration, ..Typical::default() });
             let times = sought.iter().flat_map(|f| &f.parameters).filter(|p| p.unit == "s");
-            let shortest = |p: &Parameter| if p.name == "time_constant" { 0.5 } else { 5.0 };
-            assert!(times.into_iter().all(|p| p.lower >= shortest(p) && p.starts.iter().all(|s| *s >= p.lower)));
+            assert!(times.into_iter().all(|p| p.lower >= 0.5 && p.starts.iter().all(|s| *s >= p.lower)));
         }
     }
 }
