@@ -328,8 +328,8 @@ fn what_no_form_is_off_by_is_named_however_small_a_share_it_has() {
     assert_eq!(names(&tried(71, 122)), ["observation_delay", "scale"]);
 }
 
-/// A limit within a loop follows small changes with a lag, for which a second delay was named; a housing warms after its winding, for which a
-/// change of payload was.
+/// A limit within a loop follows small changes with a lag, for which a second delay was named; a housing warms after its winding, for
+/// which a change of payload was.
 #[test]
 fn what_the_actuator_has_besides_is_no_second_effect() {
     for (seed, index, right) in [(72, 94, "rate_limit"), (73, 78, "thermal_derating")] {

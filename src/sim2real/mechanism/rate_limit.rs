@@ -12,8 +12,8 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 /// went on; in the form `from_rest`, with `slew_rate`, nothing, as where a driver is switched on with it.
 ///
 /// A limit within a loop is met by its error: in the forms `answering` and `answering_from_rest`,
-/// `du/dt = (u_command - u) / answer_time` as far as that is within `rate`, so that small changes are followed with a lag. It is the lag of the
-/// limited loop itself, and short: a longer one is an `actuator_lag` beside the limit.
+/// `du/dt = (u_command - u) / answer_time` as far as that is within `rate`, so that small changes are followed with a lag. It is
+/// the lag of the limited loop itself, and short: a longer one is an `actuator_lag` beside the limit.
 ///
 /// Source: Klyde, McRuer & Myers, "Pilot-induced oscillation analysis and prediction with actuator rate limiting", Journal
 /// of Guidance, Control, and Dynamics 20 (1997).

@@ -17,7 +17,8 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 /// `housing_share` the thermal resistance from housing to air in units of that from winding to housing. Catalogues of motors give
 /// both time constants and both resistances.
 ///
-/// Heat is solved exactly over a tick for a command that holds (with a housing to second order); the gain is that of the mean of the heat at its ends.
+/// Heat is solved exactly over a tick for a command that holds (with a housing to second order); the gain is that of the mean of
+/// the heat at its ends.
 ///
 /// Source: Joule heat into one lumped capacity, Trujillo & Cutkosky, "Thermally constrained motor operation for a climbing
 /// robot", ICRA 2009; what it does to magnets and copper, Hendershot & Miller, *Design of Brushless Permanent-Magnet
@@ -34,7 +35,7 @@ where
             name: "thermal_derating",
             site: Site::Command,
             title: "an actuator that weakens as it warms",
-            law: "dh/dt = strength u^2 - h / time_constant; linear: u -> max(0, 1 - h) u; reciprocal: u -> u / (1 + h); two_bodies: h - g for h, dg/dt = (housing_share (h - g) - g) / housing_time_constant",
+            law: "dh/dt = strength u^2 - h / time_constant; linear: u -> max(0, 1 - h) u; reciprocal: u -> u / (1 + h); two_bodies: cools by (h - g) / time_constant, dg/dt = (housing_share (h - g) - g) / housing_time_constant",
             source: "Trujillo & Cutkosky, ICRA 2009; Hendershot & Miller, Design of Brushless PM Machines (2010)",
             remedy: "measure the torque of a warm actuator; cool it, rest it, or let the simulator's gain fall with the heat",
             contains: &[],
