@@ -7,8 +7,8 @@ use super::mover::{Motion, Mover, Push};
 use super::runge_kutta::{Contact, step_with_friction};
 use super::signal::{Commands, Signal};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
-    Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Scene, Thetas,
+    Tick, Typical,
 };
 
 /// A cart of mass `M` at `x`, driven by `gain u`, with a uniform pole of mass `m` and half length `l` hinged on it, at the
@@ -217,12 +217,12 @@ impl Mover for CartPole {
         lane.inertia(lane.cart_mass, state[2].cos())
     }
 
-    fn drive(dynamics: &CartPoleDynamics, lane: usize, _: &[f64; 4], command: &Signal) -> f64 {
-        dynamics.lanes[lane].gain * command.0
+    fn drive(scene: &Scene<'_, Self>, lane: usize) -> f64 {
+        scene.dynamics.lanes[lane].gain * scene.commands[lane].0
     }
 
-    fn external(dynamics: &CartPoleDynamics, lane: usize, state: &[f64; 4], _: f64) -> f64 {
-        dynamics.lanes[lane].reaction(state)
+    fn external(scene: &Scene<'_, Self>, lane: usize, _: f64) -> f64 {
+        scene.dynamics.lanes[lane].reaction(&scene.states[lane])
     }
 }
 

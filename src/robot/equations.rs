@@ -15,7 +15,8 @@ use super::joint::Axis;
 use super::mover::{Motion, Mover, Push};
 use super::signal::Signal;
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Site, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, Observation, Parameter, Plant, Recording, Scene, Site, Stimulus, Thetas, Tick,
+    Typical,
 };
 use program::Memory;
 use solver::{Acting, Work};
@@ -155,14 +156,20 @@ impl Plant for Equations {
         let rate = rate.map_or("", |(_, state)| state.name.as_str());
         let typical = typical(recordings, &self.model.channels[0].name, rate, 1.0);
         let Some(moving) = &self.model.moving else { return typical };
-        // What a typical command pushes with, at the initial state.
+        // What a typical command pushes with, at the initial state and where recordings start.
         let system = self.system();
         let nominal: Vec<f64> = system.parameters.iter().map(|p| p.nominal).collect();
         let dynamics = self.dynamics(&Thetas::single(&nominal));
         let mut state: Vec<f64> = system.states.iter().map(|s| s.initial).collect();
         state[moving.velocity] = 0.0;
-        let effort = Self::drive(&dynamics, 0, &state, &Signal(typical.command)).abs();
-        let effort = if effort.is_finite() && effort > 0.0 { effort } else { typical.effort };
+        let pushed = |recording: &Recording<Driving>| {
+            let command = Signal(typical.command);
+            let inputs = [recording.stimulus.input(0, &command)];
+            let (states, commands) = (std::slice::from_ref(&state), [command]);
+            Self::drive(&Scene { dynamics: &dynamics, states, inputs: &inputs, commands: &commands }, 0).abs()
+        };
+        let effort = recordings.iter().map(pushed).filter(|effort| effort.is_finite()).fold(0.0, f64::max);
+        let effort = if effort > 0.0 { effort } else { typical.effort };
         Typical { effort, ..typical }
     }
 
@@ -252,12 +259,13 @@ impl Mover for Equations {
         dynamics.inertia.get(lane).copied().unwrap_or(1.0)
     }
 
-    fn drive(dynamics: &EquationsDynamics, lane: usize, state: &Vec<f64>, command: &Signal) -> f64 {
-        dynamics.effort(lane, state, command.0, None) - dynamics.effort(lane, state, 0.0, None)
+    fn drive(scene: &Scene<'_, Self>, lane: usize) -> f64 {
+        let effort = |command| scene.dynamics.effort(scene, lane, command, None);
+        effort(scene.commands[lane].0) - effort(0.0)
     }
 
-    fn external(dynamics: &EquationsDynamics, lane: usize, state: &Vec<f64>, position: f64) -> f64 {
-        dynamics.effort(lane, state, 0.0, Some(position))
+    fn external(scene: &Scene<'_, Self>, lane: usize, position: f64) -> f64 {
+        scene.dynamics.effort(scene, lane, 0.0, Some(position))
     }
 }
 
@@ -284,9 +292,9 @@ impl EquationsDynamics {
         self.model.rates.memory(1, self.rows.iter().map(|row| &row[lane..=lane]))
     }
 
-    /// Effort on what moves, in a lane in that state, or at rest at another position; inputs beside the command are taken
-    /// for 0.
-    fn effort(&self, lane: usize, state: &[f64], command: f64, position: Option<f64>) -> f64 {
+    /// Effort of `command` on what moves in lane `lane`, as it is or at rest at another position; inputs beside the command are those
+    /// of the row's start.
+    fn effort(&self, scene: &Scene<'_, Equations>, lane: usize, command: f64, position: Option<f64>) -> f64 {
         let Some(moving) = &self.model.moving else { return 0.0 };
         let mut alone = self.alone.take();
         if alone.is_empty() {
@@ -294,7 +302,11 @@ impl EquationsDynamics {
         }
         let memory = &mut alone[lane];
         memory.slot_mut(self.model.input_slot(0))[0] = command;
-        state.iter().enumerate().for_each(|(k, value)| memory.slot_mut(self.model.state_slot(k))[0] = *value);
+        for k in 1..self.model.system.inputs.len() {
+            memory.slot_mut(self.model.input_slot(k))[0] = scene.inputs[lane].begun(k - 1);
+        }
+        let state = scene.states[lane].iter().enumerate();
+        state.for_each(|(k, value)| memory.slot_mut(self.model.state_slot(k))[0] = *value);
         if let Some(position) = position {
             memory.slot_mut(self.model.state_slot(moving.position))[0] = position;
             memory.slot_mut(self.model.state_slot(moving.velocity))[0] = 0.0;

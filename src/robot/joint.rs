@@ -5,8 +5,8 @@ use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
 use super::sine::{sine, sines};
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Thetas, Tick,
-    Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Scene, Thetas,
+    Tick, Typical,
 };
 
 /// `inertia a + viscous_friction v + gravity_torque sin(q) = gain u`.
@@ -31,14 +31,16 @@ const PARAMETERS: [(&str, [&str; 2]); 4] = [
 ];
 
 /// The other units that mechanisms of a joint declare, each with what it is on a linear axis.
-const LINEAR: [(&str, &str); 9] = [
+const LINEAR: [(&str, &str); 11] = [
     ("N m", "N"),
     ("N m/rad", "N/m"),
+    ("N m/rad^1.5", "N/m^1.5"),
     ("N m/rad^3", "N/m^3"),
     ("N m s^2/rad^2", "N s^2/m^2"),
     ("rad", "m"),
     ("rad/s", "m/s"),
     ("rad/(N m)", "m/N"),
+    ("s/rad", "s/m"),
     ("1/rad", "1/m"),
     ("1/rad^2", "1/m^2"),
 ];
@@ -216,12 +218,12 @@ impl Mover for Joint {
         dynamics.lanes[lane].inertia
     }
 
-    fn drive(dynamics: &JointDynamics, lane: usize, _: &Motion, command: &Signal) -> f64 {
-        dynamics.lanes[lane].gain * command.0
+    fn drive(scene: &Scene<'_, Self>, lane: usize) -> f64 {
+        scene.dynamics.lanes[lane].gain * scene.commands[lane].0
     }
 
-    fn external(dynamics: &JointDynamics, lane: usize, _: &Motion, position: f64) -> f64 {
-        let gravity = dynamics.lanes[lane].gravity_torque;
+    fn external(scene: &Scene<'_, Self>, lane: usize, position: f64) -> f64 {
+        let gravity = scene.dynamics.lanes[lane].gravity_torque;
         if gravity == 0.0 { 0.0 } else { -gravity * sine(position) }
     }
 

@@ -1,6 +1,6 @@
 //! What moves: the coordinate of a plant on which mechanisms of motion act, whatever the plant is.
 
-use crate::sim2real::Plant;
+use crate::sim2real::{Plant, Scene};
 
 /// Where a coordinate is and how fast it moves.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -56,10 +56,11 @@ pub trait Mover: Plant {
     fn push(effect: &mut Self::Effect) -> &mut Push;
     /// Inertia of the coordinate in lane `lane` [kg m^2].
     fn inertia(dynamics: &Self::Dynamics, lane: usize, state: &Self::State) -> f64;
-    /// Effort that `command` drives it with [N m].
-    fn drive(dynamics: &Self::Dynamics, lane: usize, state: &Self::State, command: &Self::Command) -> f64;
-    /// Effort of everything else the plant knows of but damping, as gravity, were the coordinate at `position` [N m].
-    fn external(dynamics: &Self::Dynamics, lane: usize, state: &Self::State, position: f64) -> f64;
+    /// Effort that its command drives lane `lane` with [N m].
+    fn drive(scene: &Scene<'_, Self>, lane: usize) -> f64;
+    /// Effort of everything else the plant knows of but damping, as gravity, were the coordinate of lane
+    /// `lane` at `position` [N m].
+    fn external(scene: &Scene<'_, Self>, lane: usize, position: f64) -> f64;
     /// Damping the plant knows of [N m s/rad]; 0 where it has none of its own.
     fn damping(_dynamics: &Self::Dynamics, _lane: usize, _state: &Self::State) -> f64 {
         0.0

@@ -6,7 +6,7 @@ use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
 use super::sine::sine;
 use crate::sim2real::{
-    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Parameter, Plant, Recording, Thetas, Tick, Typical,
+    Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Parameter, Plant, Recording, Scene, Thetas, Tick, Typical,
 };
 
 /// A uniform rod of mass `m` and length `l` on a hinge, at the angle `q` from *upright*:
@@ -169,12 +169,12 @@ impl Mover for Pendulum {
         dynamics.lanes[lane].inertia
     }
 
-    fn drive(dynamics: &PendulumDynamics, lane: usize, _: &Motion, command: &Signal) -> f64 {
-        dynamics.lanes[lane].gain * command.0
+    fn drive(scene: &Scene<'_, Self>, lane: usize) -> f64 {
+        scene.dynamics.lanes[lane].gain * scene.commands[lane].0
     }
 
-    fn external(dynamics: &PendulumDynamics, lane: usize, _: &Motion, position: f64) -> f64 {
-        dynamics.lanes[lane].weight * sine(position)
+    fn external(scene: &Scene<'_, Self>, lane: usize, position: f64) -> f64 {
+        scene.dynamics.lanes[lane].weight * sine(position)
     }
 
     fn damping(dynamics: &PendulumDynamics, lane: usize, _: &Motion) -> f64 {

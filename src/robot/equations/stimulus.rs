@@ -32,6 +32,11 @@ impl Measurements {
         self.0.is_none()
     }
 
+    /// Input `k`, beside the command, where its row starts.
+    pub(super) fn begun(&self, k: usize) -> f64 {
+        self.0.as_ref().and_then(|row| row.inputs.get(k)).map_or(0.0, |(value, _)| *value)
+    }
+
     /// Input `k`, beside the command, at `time` [s].
     pub(super) fn at(&self, k: usize, time: f64) -> f64 {
         self.0.as_ref().and_then(|row| Some((row.start, row.inputs.get(k)?))).map_or(0.0, |(start, (value, slope))| {

@@ -157,6 +157,37 @@ fn equations_from_row_to_row_take_one_step_a_row() {
     }
 }
 
+/// A drive that is switched on and off by a second input, with gears whose friction grows with what it does: as a joint that is given
+/// no command meanwhile. Taken for off throughout, it would drive no load.
+#[test]
+fn mechanisms_know_the_other_inputs() {
+    let mut system = duffing();
+    system.inputs.push(InputVariable { name: "on".into(), unit: String::new(), interpolated: false });
+    system.rates[1].1 = "(on*u - d*v - k*sin(x))/m".into();
+    (system.states[0].unit, system.states[1].unit) = ("rad/s".into(), "rad".into());
+    let of_one = recording(500, false);
+    let (time, commands) = (of_one.time, of_one.stimulus.as_ref().to_vec());
+    let on: Vec<f64> = (0..500).map(|row| f64::from(u8::from(row % 200 < 120))).collect();
+    let given: Vec<f64> = commands.iter().zip(&on).map(|(u, on)| u * on).collect();
+    let stimulus = Driving::new(&time, &[(commands, false), (on, false)]);
+    let ours = Recording { name: String::new(), stimulus, measured: of_one.measured, time: time.clone() };
+    let theirs = Recording { name: String::new(), stimulus: Commands(given), measured: vec![], time };
+
+    let plant = Equations::new(system, 1e-4).unwrap();
+    let typical = plant.typical(std::slice::from_ref(&ours));
+    assert!((typical.effort / typical.command - 1.0).abs() < 1e-9, "{typical:?}");
+    let joint = Joint::new(Axis::Rotary, [0.7, 0.4, 9.0, 1.0], [0.1; 4]);
+    let of_ours = EQUATIONS_MECHANISMS.iter().find(|m| m.about().name == "load_friction").unwrap();
+    let of_joint = MECHANISMS.iter().find(|m| m.about().name == "load_friction").unwrap();
+    let form = of_ours.forms(&typical).remove(0).parameters;
+    let written = Assembly::new(plant, EQUATIONS_MECHANISMS).with_mechanism(*of_ours, 0, form.clone());
+    let joint = Assembly::new(joint, MECHANISMS).with_mechanism(*of_joint, 0, form).stepping(1e-4);
+    let written = written.rollout(&Thetas::single(&[0.4, 9.0, 20.0, 0.7, 0.2, 0.3, 0.3, 0.0]), &ours, 0..500, Seed(0));
+    let joint = joint.rollout(&Thetas::single(&[0.7, 0.4, 9.0, 1.0, 0.2, 0.3, 0.3, 0.0]), &theirs, 0..500, Seed(0));
+    let worst = joint[0][0].samples.iter().zip(&written[0][0].samples).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-3, "{worst} rad");
+}
+
 /// A second input, measured, is taken as it is, straight from row to row where it is said to.
 #[test]
 fn other_inputs_are_taken_as_measured() {

@@ -148,7 +148,7 @@ impl<P: Mover> Law<P> for Gap {
             }
             let link = P::motion(state);
             let inertia = P::inertia(scene.dynamics, lane, state);
-            let drive = P::drive(scene.dynamics, lane, state, &scene.commands[lane]);
+            let drive = P::drive(scene, lane);
             let damping = P::damping(scene.dynamics, lane, state);
             let reduced = share * (1.0 - share) * inertia;
             let (stiffness, damping_ratio) = match &self.spring {
@@ -162,7 +162,7 @@ impl<P: Mover> Law<P> for Gap {
                     motor
                 }
                 None => {
-                    let external = P::external(scene.dynamics, lane, state, link.position);
+                    let external = P::external(scene, lane, link.position);
                     let load = -as_one(*share, external, drive);
                     let leans = load != 0.0 && leans(link.velocity, *gap, [drive, external]);
                     let away = if leans { load / wall.stiffness + load.signum() * 0.5 * gap } else { 0.0 };

@@ -225,15 +225,11 @@ impl<P: Mover> Law<P> for OnMotor {
         let sides = |lane, state: &P::State, link: f64| {
             let motor = P::motion(state);
             let midway = motor.midway(tick.step);
-            Sides {
-                second: P::external(scene.dynamics, lane, state, link),
-                misplaced: P::external(scene.dynamics, lane, state, midway),
-                damping: 0.0,
-            }
+            Sides { second: P::external(scene, lane, link), misplaced: P::external(scene, lane, midway), damping: 0.0 }
         };
         self.0.turn(tick, scene, effects, sides, |lane, state| {
-            let external = P::external(scene.dynamics, lane, state, P::motion(state).position);
-            (P::drive(scene.dynamics, lane, state, &scene.commands[lane]), external)
+            let external = P::external(scene, lane, P::motion(state).position);
+            (P::drive(scene, lane), external)
         });
     }
 }
@@ -255,13 +251,12 @@ impl<P: Mover> Law<P> for OnLink {
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        let drive = |lane, state: &P::State| P::drive(scene.dynamics, lane, state, &scene.commands[lane]);
         let sides = |lane, state: &P::State, _| {
-            let effort = drive(lane, state);
+            let effort = P::drive(scene, lane);
             Sides { second: effort, misplaced: effort, damping: P::damping(scene.dynamics, lane, state) }
         };
         self.0.turn(tick, scene, effects, sides, |lane, state| {
-            (P::external(scene.dynamics, lane, state, P::motion(state).position), drive(lane, state))
+            (P::external(scene, lane, P::motion(state).position), P::drive(scene, lane))
         });
     }
 }

@@ -1,6 +1,6 @@
 //! A mechanical stop at the end of the way.
 
-use super::spring::Wall;
+use super::spring::{Contact, RoundWall, Wall};
 use crate::robot::{Mover, Push};
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
@@ -8,10 +8,13 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 const REACH: f64 = 0.35;
 
 /// Beyond `upper`, `-(stiffness (q - upper) + damping v)`, never pulling back; likewise below `lower`; or both. The damping
-/// is `2 damping_ratio sqrt(stiffness inertia)`.
+/// is `2 damping_ratio sqrt(stiffness inertia)`. In the forms `upper_round`, `lower_round` and `both_round` it is
+/// `-contact_stiffness (q - upper)^1.5 (1 + dissipation v)`: what bears on a round or a rough stop bears on more of it the deeper it
+/// goes, and less of a faster blow is given back.
 ///
 /// Source: Kelvin and Voigt's body as a contact, as in Gilardi & Sharf, "Literature survey of contact dynamics modelling",
-/// Mechanism and Machine Theory 37 (2002), section 3.
+/// Mechanism and Machine Theory 37 (2002), section 3; round: Hunt & Crossley, "Coefficient of restitution interpreted as damping in
+/// vibroimpact", Journal of Applied Mechanics 42 (1975).
 #[derive(Debug, Clone, Copy)]
 pub struct EndStop;
 
@@ -21,8 +24,10 @@ impl<P: Mover> Mechanism<P> for EndStop {
             name: "end_stop",
             site: Site::Plant,
             title: "an end stop",
-            law: "inertia a = ... - stiffness (q - upper) - damping v beyond upper; likewise below lower",
-            source: "Gilardi & Sharf, Mechanism and Machine Theory 37 (2002), section 3",
+            law: "inertia a = ... - stiffness (q - upper) - damping v beyond upper; likewise below lower; \
+                  round: - contact_stiffness (q - upper)^1.5 (1 + dissipation v)",
+            source: "Gilardi & Sharf, Mechanism and Machine Theory 37 (2002), section 3; \
+                     Hunt & Crossley, Journal of Applied Mechanics 42 (1975)",
             remedy: "keep the motion off the stop, or give the joint of the simulator its limits",
             contains: &[],
         }
@@ -42,11 +47,23 @@ impl<P: Mover> Mechanism<P> for EndStop {
             Parameter::new("stiffness", "N m/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)
         };
         let ratio = || Parameter::new("damping_ratio", "", 0.0).within(0.0, 10.0).starting_at(&[0.5]);
+        // As deep under a typical effort as those springs.
+        let contact = || {
+            let starts = [10.0, 100.0, 1000.0].map(|factor: f64| typical.effort * (factor / span).powf(1.5));
+            Parameter::new("contact_stiffness", "N m/rad^1.5", 0.0).within(0.0, f64::INFINITY).starting_at(&starts)
+        };
+        let dissipation = || {
+            let start = 0.3 / typical.rate.max(1e-9);
+            Parameter::new("dissipation", "s/rad", 0.0).within(0.0, f64::INFINITY).starting_at(&[start])
+        };
         let (one, two) = ([0.01, 0.05, 0.15], [0.01, 0.1]);
         vec![
             Form { name: "upper", parameters: vec![upper(&one), stiffness(), ratio()] },
             Form { name: "lower", parameters: vec![lower(&one), stiffness(), ratio()] },
             Form { name: "both", parameters: vec![lower(&two), upper(&two), stiffness(), ratio()] },
+            Form { name: "upper_round", parameters: vec![upper(&one), contact(), dissipation()] },
+            Form { name: "lower_round", parameters: vec![lower(&one), contact(), dissipation()] },
+            Form { name: "both_round", parameters: vec![lower(&two), upper(&two), contact(), dissipation()] },
         ]
     }
 
@@ -66,40 +83,72 @@ impl<P: Mover> Mechanism<P> for EndStop {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let sides = SIDES[form % SIDES.len()];
         let never = |value| vec![value; thetas.lanes()];
-        let (lower, upper) = match form {
-            0 => (never(f64::NEG_INFINITY), thetas.row(0).to_vec()),
-            1 => (thetas.row(0).to_vec(), never(f64::INFINITY)),
-            _ => (thetas.row(0).to_vec(), thetas.row(1).to_vec()),
+        let (lower, upper) = match sides {
+            Sides::Upper => (never(f64::NEG_INFINITY), thetas.row(0).to_vec()),
+            Sides::Lower => (thetas.row(0).to_vec(), never(f64::INFINITY)),
+            Sides::Both => (thetas.row(0).to_vec(), thetas.row(1).to_vec()),
         };
-        let at = if form == 2 { 2 } else { 1 };
-        let [stiffness, damping_ratio] = [at, at + 1].map(|k| thetas.row(k).to_vec());
-        Box::new(Stops { form, lower, upper, stiffness, damping_ratio })
+        let [stiffness, loss] = [0, 1].map(|k| thetas.row(sides.count() + k).to_vec());
+        Box::new(Stops { sides, round: form >= SIDES.len(), lower, upper, stiffness, loss })
+    }
+}
+
+/// The ends at which there is a stop, in the order of forms.
+const SIDES: [Sides; 3] = [Sides::Upper, Sides::Lower, Sides::Both];
+
+#[derive(Debug, Clone, Copy)]
+enum Sides {
+    Upper,
+    Lower,
+    Both,
+}
+
+impl Sides {
+    fn count(self) -> usize {
+        if matches!(self, Self::Both) { 2 } else { 1 }
     }
 }
 
 #[derive(Clone)]
 struct Stops {
-    /// Of the lower end alone where it is 1, of the upper alone where it is 0.
-    form: usize,
+    sides: Sides,
+    /// Whether they are [`RoundWall`]s.
+    round: bool,
     lower: Vec<f64>,
     upper: Vec<f64>,
     stiffness: Vec<f64>,
-    damping_ratio: Vec<f64>,
+    /// Damping ratio, or dissipation of round ones.
+    loss: Vec<f64>,
+}
+
+impl Stops {
+    #[inline]
+    fn meet(&self, lane: usize, inertia: f64, depth: f64, rate: f64, step: f64) -> Option<Contact> {
+        let (stiffness, loss) = (self.stiffness[lane], self.loss[lane]);
+        if self.round {
+            RoundWall { stiffness, dissipation: loss, inertia }.meet(depth, rate, step)
+        } else {
+            Wall { stiffness, damping_ratio: loss, inertia }.meet(depth, rate, step)
+        }
+    }
 }
 
 impl<P: Mover> Law<P> for Stops {
     fn change(&mut self, change: &LaneChange<'_>) {
-        let form = self.form;
-        change.derived(&mut self.lower, |values| if form == 0 { f64::NEG_INFINITY } else { values[0] });
-        change.derived(&mut self.upper, |values| match form {
-            0 => values[0],
-            1 => f64::INFINITY,
-            _ => values[1],
+        let sides = self.sides;
+        change.derived(&mut self.lower, |values| match sides {
+            Sides::Upper => f64::NEG_INFINITY,
+            Sides::Lower | Sides::Both => values[0],
         });
-        let at = if form == 2 { 2 } else { 1 };
-        change.parameter(at, &mut self.stiffness);
-        change.parameter(at + 1, &mut self.damping_ratio);
+        change.derived(&mut self.upper, |values| match sides {
+            Sides::Upper => values[0],
+            Sides::Lower => f64::INFINITY,
+            Sides::Both => values[1],
+        });
+        change.parameter(sides.count(), &mut self.stiffness);
+        change.parameter(sides.count() + 1, &mut self.loss);
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
@@ -111,20 +160,16 @@ impl<P: Mover> Law<P> for Stops {
             if most <= *upper && least >= *lower {
                 continue;
             }
-            let wall = Wall {
-                stiffness: self.stiffness[lane],
-                damping_ratio: self.damping_ratio[lane],
-                inertia: P::inertia(scene.dynamics, lane, state),
-            };
+            let inertia = P::inertia(scene.dynamics, lane, state);
             let push = P::push(effect);
-            meet(&wall, motion.position - upper, motion.velocity, tick.step, -1.0, push);
-            meet(&wall, lower - motion.position, -motion.velocity, tick.step, 1.0, push);
+            push_off(push, self.meet(lane, inertia, motion.position - upper, motion.velocity, tick.step), -1.0);
+            push_off(push, self.meet(lane, inertia, lower - motion.position, -motion.velocity, tick.step), 1.0);
         }
     }
 }
 
-fn meet(wall: &Wall, depth: f64, rate: f64, step: f64, off: f64, push: &mut Push) {
-    if let Some(contact) = wall.meet(depth, rate, step) {
+fn push_off(push: &mut Push, contact: Option<Contact>, off: f64) {
+    if let Some(contact) = contact {
         push.effort += off * contact.effort;
         push.damping += contact.damping;
         push.inertia += contact.inertia;
@@ -159,6 +204,37 @@ mod tests {
         }
     }
 
+    /// So it does on a round stop, whose effort is that of its depth to the power of 1.5.
+    #[test]
+    fn it_rests_where_a_round_stop_balances_the_drive() {
+        let trial = Trial { parameters: [0.1, 0.2, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
+        for stiffness in [100.0, 1e4, 1e6, 1e9] {
+            for (form, values, drive) in [
+                (3, vec![0.5, stiffness, 0.3], 1.5),
+                (4, vec![-0.5, stiffness, 0.3], -1.5),
+                (5, vec![-0.5, 0.5, stiffness, 0.3], -1.5),
+            ] {
+                let rest = trial.follow(&EndStop, form, &values, &vec![drive; 20_000])[19_999];
+                let expected = f64::signum(drive) * (0.5 + (1.5 / stiffness).powf(2.0 / 3.0));
+                assert!((rest.position - expected).abs() < 1e-7, "{stiffness}: {} not {expected}", rest.position);
+            }
+        }
+    }
+
+    /// A round stop gives back all of a slow blow, and less of a fast one, as fine steps of the same contact have it.
+    #[test]
+    fn a_round_stop_gives_back_less_of_a_faster_blow() {
+        let trial = |velocity| Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.0, velocity, step: 1e-3 };
+        let mut given_back = f64::INFINITY;
+        for (speed, dissipation) in [(0.5, 0.0), (0.5, 0.3), (1.0, 0.3), (2.0, 0.3)] {
+            let motion = trial(speed).follow(&EndStop, 3, &[0.25, 1_000.0, dissipation], &vec![0.0; 800]);
+            let off = -motion[799].velocity / speed;
+            let expected = -fine(speed, |x, v| -1e4 * x * x.max(0.0).sqrt() * (1.0 + dissipation * v)) / speed;
+            assert!((off - expected).abs() < 0.01 && off < given_back, "{speed}: {off}, expected {expected}");
+            given_back = off;
+        }
+    }
+
     /// Without damping it bounces off as fast as it came; with damping, as fine steps of the same contact have it.
     #[test]
     fn it_bounces_off_as_the_closed_form_has_it() {
@@ -173,13 +249,17 @@ mod tests {
 
     /// Speed after the contact of a body of unit mass and speed with a wall of unit frequency, by fine steps.
     fn bounce(ratio: f64) -> f64 {
-        let (mut x, mut v, h) = (0.0, 1.0, 1e-5);
+        -fine(1.0, |x, v| -x - 2.0 * ratio * v)
+    }
+
+    /// Velocity of a body that comes into a wall at `speed` when that lets it go; `acceleration` is by depth and velocity.
+    fn fine(speed: f64, acceleration: impl Fn(f64, f64) -> f64) -> f64 {
+        let (mut x, mut v, h) = (0.0, speed, 1e-5);
         loop {
-            let force = |x: f64, v: f64| -x - 2.0 * ratio * v;
-            let (half_x, half_v) = (x + 0.5 * h * v, v + 0.5 * h * force(x, v));
-            (x, v) = (x + h * half_v, v + h * force(half_x, half_v));
-            if force(x, v) >= 0.0 && v < 0.0 {
-                return -v;
+            let (half_x, half_v) = (x + 0.5 * h * v, v + 0.5 * h * acceleration(x, v));
+            (x, v) = (x + h * half_v, v + h * acceleration(half_x, half_v));
+            if acceleration(x, v) >= 0.0 && v < 0.0 {
+                return v;
             }
         }
     }
@@ -189,12 +269,14 @@ mod tests {
     fn the_stop_has_a_derivative() {
         let trial = Trial { parameters: [0.1, 0.2, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
         let drive: Vec<f64> = (0..2_000).map(|k| 1.5 * (3.0 * f64::from(k) * 1e-3).sin()).collect();
-        let at = |upper: f64| trial.follow(&EndStop, 0, &[upper, 500.0, 0.3], &drive)[1_999].position;
-        let wide = (at(0.31) - at(0.29)) / 0.02;
-        for k in 0..20 {
-            let upper = 0.3 + f64::from(k) * 1.3e-4;
-            let narrow = (at(upper + 2e-5) - at(upper - 2e-5)) / 4e-5;
-            assert!((narrow - wide).abs() < 0.15 * wide.abs(), "{upper}: {narrow}, {wide} over a wider step");
+        for (form, stiffness) in [(0, 500.0), (3, 5e3)] {
+            let at = |upper: f64| trial.follow(&EndStop, form, &[upper, stiffness, 0.3], &drive)[1_999].position;
+            let wide = (at(0.31) - at(0.29)) / 0.02;
+            for k in 0..20 {
+                let upper = 0.3 + f64::from(k) * 1.3e-4;
+                let narrow = (at(upper + 2e-5) - at(upper - 2e-5)) / 4e-5;
+                assert!((narrow - wide).abs() < 0.15 * wide.abs(), "{form}, {upper}: {narrow}, {wide} over a wider step");
+            }
         }
     }
 }

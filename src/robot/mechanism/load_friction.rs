@@ -122,8 +122,8 @@ impl Gears {
 fn efforts<P: Mover>(tick: Tick, scene: &Scene<'_, P>, lane: usize, state: &P::State) -> (f64, f64) {
     let motion = P::motion(state);
     let midway = motion.midway(tick.step);
-    let external = P::external(scene.dynamics, lane, state, midway);
-    (P::drive(scene.dynamics, lane, state, &scene.commands[lane]), external)
+    let external = P::external(scene, lane, midway);
+    (P::drive(scene, lane), external)
 }
 
 impl<P: Mover> Law<P> for Gears {

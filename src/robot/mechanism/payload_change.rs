@@ -91,7 +91,7 @@ impl Payload {
         let push = P::push(effect);
         push.inertia += share * inertia * P::inertia(scene.dynamics, lane, state);
         if gravity != 0.0 {
-            push.effort += share * gravity * P::external(scene.dynamics, lane, state, midway);
+            push.effort += share * gravity * P::external(scene, lane, midway);
         }
     }
 }
