@@ -321,6 +321,27 @@ const CASES: &[Case] = &[
         most: 1e-3,
     },
     Case {
+        mechanism: "end_stop",
+        form: "upper_round",
+        values: &[0.5, 1_000.0, 0.4],
+        law: |_, x, u| plain(x, u, -round_stop(x[0] - 0.5, x[1])),
+        most: 1e-3,
+    },
+    Case {
+        mechanism: "end_stop",
+        form: "lower_round",
+        values: &[-0.5, 1_000.0, 0.4],
+        law: |_, x, u| plain(x, u, round_stop(-0.5 - x[0], -x[1])),
+        most: 1e-3,
+    },
+    Case {
+        mechanism: "end_stop",
+        form: "both_round",
+        values: &[-0.5, 0.6, 1_000.0, 0.4],
+        law: |_, x, u| plain(x, u, round_stop(-0.5 - x[0], -x[1]) - round_stop(x[0] - 0.6, x[1])),
+        most: 1e-3,
+    },
+    Case {
         mechanism: "compliance",
         form: "on_link",
         values: &[1.0 / 40.0, 0.6, 0.05],
@@ -460,6 +481,11 @@ fn loaded(t: f64, x: State, u: f64, time: f64, inertia: f64, gravity: f64) -> Fo
 /// A stop of 300 N m/rad and a damping ratio of 0.2.
 fn stop(depth: f64, rate: f64) -> f64 {
     pushed(depth, rate, 300.0, 0.4 * (300.0 * INERTIA).sqrt())
+}
+
+/// Effort of a stop on which more bears the deeper it is met.
+fn round_stop(depth: f64, rate: f64) -> f64 {
+    1_000.0 * depth.max(0.0).powf(1.5) * (1.0 + 0.4 * rate).max(0.0)
 }
 
 #[test]

@@ -338,6 +338,16 @@ fn what_the_actuator_has_besides_is_no_second_effect() {
     }
 }
 
+/// A stop that is stiffer the deeper it is met: what a spring with a damper left of it was named a compliance, and of heat beside one
+/// nothing was found.
+#[test]
+fn what_a_stop_is_made_of_is_no_second_effect() {
+    for (seed, index, right) in [(73, 21, vec!["end_stop"]), (70, 8, vec!["end_stop", "thermal_derating"])] {
+        let trial = tried(seed, index);
+        assert_eq!((names(&trial), trial.verdict), (right, Verdict::Named), "{seed}/{index}");
+    }
+}
+
 /// A small delay of the command beside an end stop: an actuator's lag and a late sensor do as well, and it was dropped for that.
 #[test]
 fn one_of_several_delays_is_there_though_nobody_can_tell_which() {
