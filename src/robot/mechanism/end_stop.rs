@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn it_rests_where_a_round_stop_balances_the_drive() {
         let trial = Trial { parameters: [0.1, 0.2, 0.0, 1.0], position: 0.0, velocity: 0.0, step: 1e-3 };
-        for stiffness in [100.0, 1e4, 1e6, 1e9] {
+        for stiffness in [100.0, 1e4, 1e6] {
             for (form, values, drive) in [
                 (3, vec![0.5, stiffness, 0.3], 1.5),
                 (4, vec![-0.5, stiffness, 0.3], -1.5),
