@@ -30,7 +30,7 @@ struct Set {
     absolute: bool,
 }
 
-const SETS: [Set; 4] = [
+const SETS: [Set; 6] = [
     Set {
         name: "emps",
         twin: "emps.toml",
@@ -61,27 +61,32 @@ const SETS: [Set; 4] = [
         shown: (1e3, "mV"),
         absolute: false,
     },
+    BAM[0],
+    BAM[1],
+    BAM[2],
+];
+
+const BAM: [Set; 3] = [
+    bam("bam_kp100", &BAM_100, &["kp100_sin_time_square.csv"]),
+    bam("bam_kp200", &BAM_200, &["kp200_sin_time_square.csv"]),
+    bam("bam_kp400", &BAM_400, &["kp400_sin_time_square.csv"]),
+];
+const BAM_100: [&str; 3] = ["kp100_lift_and_drop.csv", "kp100_sin_sin.csv", "kp100_up_and_down.csv"];
+const BAM_200: [&str; 3] = ["kp200_lift_and_drop.csv", "kp200_sin_sin.csv", "kp200_up_and_down.csv"];
+const BAM_400: [&str; 3] = ["kp400_lift_and_drop.csv", "kp400_sin_sin.csv", "kp400_up_and_down.csv"];
+
+const fn bam(name: &'static str, train: &'static [&'static str], test: &'static [&'static str]) -> Set {
     Set {
-        name: "bam_xl330",
+        name,
         twin: "bam_xl330.toml",
-        train: &[
-            "kp100_lift_and_drop.csv",
-            "kp100_sin_sin.csv",
-            "kp100_up_and_down.csv",
-            "kp200_lift_and_drop.csv",
-            "kp200_sin_sin.csv",
-            "kp200_up_and_down.csv",
-            "kp400_lift_and_drop.csv",
-            "kp400_sin_sin.csv",
-            "kp400_up_and_down.csv",
-        ],
-        test: &["kp100_sin_time_square.csv", "kp200_sin_time_square.csv", "kp400_sin_time_square.csv"],
+        train,
+        test,
         known: "load-dependent friction of the gears, a delay of 7 ms, a zero offset of 0.025 rad",
-        published: "mean absolute: .0399 (M1), .0321 (M3), .0349 (M6)",
+        published: "mean absolute, all gains together: .0399 (M1), .0321 (M3), .0349 (M6)",
         shown: (1.0, "rad"),
         absolute: true,
-    },
-];
+    }
+}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -96,7 +101,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 silverbox(&folder, scratch.path())?;
                 run(set, scratch.path())?
             }
-            "bam_xl330" => {
+            name if name.starts_with("bam_") => {
                 set.train.iter().chain(set.test).try_for_each(|file| with_gain(&folder, scratch.path(), file))?;
                 run(set, scratch.path())?
             }
@@ -117,8 +122,10 @@ const FOOT: &str = "\nParameters are in the `trued.toml` that `trueup diagnose` 
 Where a published figure is better, this is what stands in the way.\n\n\
 - `cascaded_tanks`: the published grey box has outflow laws of its own; the twin has Torricelli's and the overflow.\n\
 - `bam_*`: the published fits are to all gains and all recordings together; here each gain has three recordings of some \
-seconds. In closed loop what is left of them is one smooth curve, which holds little independent evidence: what is named explains \
-most of it, and is not sure.\n";
+seconds. In closed loop what is left of them is one smooth curve, which holds little independent evidence: what is named is not \
+sure, and at a gain of 200 no law gains what is asked for, so that refitting what the twin has is worse than as given. In all nine \
+recordings together, which takes most of an hour, the friction of the gears is named first, and teeth that are not there second: \
+.064 / .161 / .071 rad.\n";
 
 fn run(set: &Set, folder: &Path) -> Result<String, Box<dyn Error>> {
     let twin = TwinFile::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/real_recordings").join(set.twin))?;
@@ -159,26 +166,26 @@ fn names(diagnosis: &Diagnosis) -> String {
     if all.is_empty() { "nothing".to_owned() } else { all.join(", ") }
 }
 
-/// Errors on each held-out recording; mean absolute ones, of all together.
+/// Errors on each held-out recording.
 fn errors<T>(set: &Set, outcome: &Outcome<T>) -> String {
-    let channel = &outcome.diagnosis.fit[0].channel;
-    let held_out: Vec<&Comparison> = outcome.comparisons.iter().filter(|c| c.held_out && c.channel == *channel).collect();
-    let (factor, unit) = set.shown;
-    let of = |group: &[&Comparison]| {
-        let all = |simulated: fn(&Comparison) -> &[f64]| {
-            let errors = group.iter().flat_map(|c| c.measured.iter().zip(simulated(c)));
-            factor * size(errors.filter_map(|(m, s)| Some((*m)? - s)), set.absolute)
-        };
-        let [nominal, recalibrated, trued] = [all(|c| &c.nominal), all(|c| &c.recalibrated), all(|c| &c.trued)];
-        format!("{nominal:.3} / {recalibrated:.3} / **{trued:.3}** {unit}")
-    };
-    let together = if set.absolute { held_out.len().max(1) } else { 1 };
-    held_out.chunks(together).map(of).collect::<Vec<String>>().join("; ")
+    let mut out = String::new();
+    for comparison in outcome.comparisons.iter().filter(|c| c.held_out && c.channel == outcome.diagnosis.fit[0].channel) {
+        let (factor, unit) = set.shown;
+        let of = |simulated: &[f64]| factor * error(comparison, simulated, set.absolute);
+        let _ = write!(
+            out,
+            "{}{:.3} / {:.3} / **{:.3}** {unit}",
+            if out.is_empty() { "" } else { "; " },
+            of(&comparison.nominal),
+            of(&comparison.recalibrated),
+            of(&comparison.trued)
+        );
+    }
+    out
 }
 
-/// Mean absolute size of errors, or root of their mean square.
-fn size(errors: impl Iterator<Item = f64>, absolute: bool) -> f64 {
-    let errors: Vec<f64> = errors.collect();
+fn error(comparison: &Comparison, simulated: &[f64], absolute: bool) -> f64 {
+    let errors: Vec<f64> = comparison.measured.iter().zip(simulated).filter_map(|(m, s)| Some((*m)? - s)).collect();
     let count = errors.len().max(1) as f64;
     if absolute {
         errors.iter().map(|e| e.abs()).sum::<f64>() / count
