@@ -123,9 +123,7 @@ Where a published figure is better, this is what stands in the way.\n\n\
 - `cascaded_tanks`: the published grey box has outflow laws of its own; the twin has Torricelli's and the overflow.\n\
 - `bam_*`: the published fits are to all gains and all recordings together; here each gain has three recordings of some \
 seconds. In closed loop what is left of them is one smooth curve, which holds little independent evidence: what is named is not \
-sure, and at a gain of 200 no law gains what is asked for, so that refitting what the twin has is worse than as given. In all nine \
-recordings together, which takes most of an hour, the friction of the gears is named first, and teeth that are not there second: \
-.064 / .161 / .071 rad.\n";
+sure, and where no law gains what is asked for, refitting what the twin has makes it worse than as given.\n";
 
 fn run(set: &Set, folder: &Path) -> Result<String, Box<dyn Error>> {
     let twin = TwinFile::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/real_recordings").join(set.twin))?;

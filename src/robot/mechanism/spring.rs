@@ -133,18 +133,26 @@ mod tests {
 
     #[test]
     fn what_a_wall_does_moves_evenly_with_where_it_is_and_never_pulls() {
+        let step = 1e-3;
         let wall = Wall { stiffness: 1e4, damping_ratio: 1.0, inertia: 0.1 };
-        let (rate, step) = (2.0, 1e-3);
+        let round = RoundWall { stiffness: 1e5, dissipation: 2.0, inertia: 0.1 };
+        evenly(|depth, rate| wall.meet(depth, rate, step));
+        evenly(|depth, rate| round.meet(depth, rate, step));
+    }
+
+    /// Holds a wall of at most 1e4 N m/rad to that, met at 2 rad/s and left as fast.
+    fn evenly(meet: impl Fn(f64, f64) -> Option<Contact>) {
+        let rate = 2.0;
         let mut before: Option<Contact> = None;
         for k in 0..400 {
             let depth = -3e-3 + f64::from(k) * 1e-5;
-            let now = wall.meet(depth, rate, step).unwrap_or(Contact { effort: 0.0, damping: 0.0, inertia: 0.0 });
+            let now = meet(depth, rate).unwrap_or(Contact { effort: 0.0, damping: 0.0, inertia: 0.0 });
             if let Some(before) = before {
                 assert!((now.effort - before.effort).abs() <= 1e4 * 1.001e-5);
                 assert!((now.damping - before.damping).abs() < 0.01 * 64.0);
             }
             before = Some(now);
-            if let Some(leaving) = wall.meet(depth, -rate, step) {
+            if let Some(leaving) = meet(depth, -rate) {
                 assert!(leaving.effort - leaving.damping * rate >= -1e-12);
             }
         }
