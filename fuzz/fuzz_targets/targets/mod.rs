@@ -1,4 +1,4 @@
-//! What is done with some bytes: a file a reader, and one for the engine that matches orders. The fuzzer runs these, and so does a test (`tests/reader_seeds.rs`).
+//! What is done with some bytes: a file a reader, and one for the engine that matches orders. The fuzzer runs these, and so does a test (`tests/io/reader_seeds.rs`).
 
 mod account;
 mod columnar;

@@ -1,0 +1,29 @@
+//! Backtests, from the data they are given to the account they leave, and environments of markets.
+
+mod account_scene;
+mod accounts;
+mod accounts_reconcile;
+mod anything_scene;
+mod backtest;
+mod checkpoints;
+mod displaced;
+mod env;
+mod env_scene;
+mod env_tasks;
+mod halts;
+mod indicators;
+mod margin;
+mod market_scene;
+mod matching;
+mod matching_by_order;
+mod orders;
+mod queue_position;
+mod queues;
+mod reconcile;
+mod round_trips;
+mod session_rules;
+mod sessions;
+mod stale_quotes;
+mod strategies;
+mod streaming;
+mod ways_scene;
