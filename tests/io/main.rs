@@ -2,9 +2,6 @@
 
 #![cfg(feature = "io")]
 
-#[path = "../../fuzz/fuzz_targets/targets/mod.rs"]
-mod targets;
-
 mod bad_documents;
 mod bad_input;
 mod chunks;

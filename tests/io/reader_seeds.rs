@@ -2,6 +2,9 @@
 //! panic. `./x fuzz` looks further, at what leads somewhere new.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails where a value is missing")]
 
+#[path = "../../fuzz/fuzz_targets/targets/mod.rs"]
+mod targets;
+
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -9,7 +12,7 @@ use std::path::{Path, PathBuf};
 use rand::RngExt;
 use trueup::sim2real::{Draws, Seed};
 
-use crate::targets::{Scene, TARGETS, Target};
+use targets::{Scene, TARGETS, Target};
 
 /// Changes made of each seed.
 const CHANGES: usize = 24;

@@ -1,5 +1,7 @@
 //! A folder for the files of one test of a reader.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may stop where it fails")]
+
 use std::fs;
 use std::path::PathBuf;
 
