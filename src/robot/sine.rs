@@ -1,6 +1,8 @@
 //! The sine as a polynomial, which compilers turn into vector instructions over lanes, where a library's is called lane by
 //! lane. It has the same bits on every machine.
 
+use pulp::{Arch, NullaryFnOnce};
+
 /// Above this size [rad] the reduction to half a turn would lose digits.
 const LARGEST: f64 = 1e5;
 /// Adding this to a number of less than 2^51 rounds it to a whole one, whose lowest bit is then the lowest of the sum.
@@ -32,10 +34,38 @@ pub(super) fn sine(angle: f64) -> f64 {
 #[inline]
 pub(super) fn sines(angles: &mut [f64]) {
     if angles.iter().fold(true, |all, angle| all & within(*angle)) {
-        angles.iter_mut().for_each(|angle| *angle = polynomial(*angle));
+        Arch::new().dispatch(Polynomials(angles));
     } else {
         angles.iter_mut().for_each(|angle| *angle = sine(*angle));
     }
+}
+
+/// Angles that take so many at once of the widest vectors there are.
+const BLOCK: usize = 8;
+
+/// Angles whose polynomials are to be put in their place.
+struct Polynomials<'a>(&'a mut [f64]);
+
+impl NullaryFnOnce for Polynomials<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let (blocks, rest) = self.0.as_chunks_mut::<BLOCK>();
+        blocks.iter_mut().for_each(of_block);
+        // A block that is not full takes no longer than a full one, and less than its angles one by one.
+        if !rest.is_empty() {
+            let mut block = [0.0; BLOCK];
+            block[..rest.len()].copy_from_slice(rest);
+            of_block(&mut block);
+            rest.copy_from_slice(&block[..rest.len()]);
+        }
+    }
+}
+
+#[inline(always)]
+fn of_block(angles: &mut [f64; BLOCK]) {
+    angles.iter_mut().for_each(|angle| *angle = polynomial(*angle));
 }
 
 /// Whether the polynomial will do; not for what is no number.
@@ -72,10 +102,11 @@ mod tests {
                 assert!(apart <= 2.0 * f64::EPSILON, "{angle}: {} and {}", sine(angle), angle.sin());
             }
         }
-        for angles in [[0.3, -2.0, 1e4, 7.1, 0.0], [0.3, -2.0, 1e9, 7.1, 0.0]] {
-            let mut all = angles;
+        let many: Vec<f64> = (0..21).map(|k| 0.7 * f64::from(k) - 5.0).chain([1e9]).collect();
+        for count in 0..=many.len() {
+            let mut all = many[..count].to_vec();
             sines(&mut all);
-            assert_eq!(all, angles.map(sine));
+            assert_eq!(all, many[..count].iter().map(|angle| sine(*angle)).collect::<Vec<_>>());
         }
         assert_eq!(sine(0.0), 0.0);
         assert_eq!(sine(1e-9), 1e-9_f64.sin());
