@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::oracle::{OracleFit, oracle};
 use crate::conceal::Span;
-use crate::sim2real::diagnose::{Diagnosis, Effect, Estimate, Verdict, diagnose};
+use crate::sim2real::diagnose::{Diagnosis, Effect, Estimate, Outcome, Verdict, diagnose};
 use crate::sim2real::{Assembly, Plant, Recording, Seed};
 
 /// What was said of a case, and what the baselines said.
@@ -89,22 +89,29 @@ impl<P: Plant> Given<P> {
     /// gives a time [s].
     pub fn tried(&self, names: &[&str], regression: Vec<String>, clock: &(dyn Fn() -> f64 + Sync)) -> Trial {
         let Self { twin, train, test, channel } = self;
+        let (trial, outcome) = self.answered(clock);
+        Trial { oracle: oracle(twin, train, test, names, channel, &outcome), regression, ..trial }
+    }
+
+    /// Diagnoses it, and asks no other.
+    pub fn answered(&self, clock: &(dyn Fn() -> f64 + Sync)) -> (Trial, Outcome<Assembly<P>>) {
+        let Self { twin, train, test, channel } = self;
         let began = clock();
         let outcome = diagnose(twin, train, test, Seed(0), &|_, _, _| {});
         let seconds = clock() - began;
-        let oracle = oracle(twin, train, test, names, channel, &outcome);
-        let diagnosis = outcome.diagnosis;
-        Trial {
+        let diagnosis = &outcome.diagnosis;
+        let trial = Trial {
             verdict: diagnosis.verdict,
             remainder: finite(diagnosis.checks.remainder),
             onset: diagnosis.location.onset,
-            intervals: intervals(&diagnosis, &train[0].name),
-            held_out: held_out(&diagnosis, channel),
-            oracle,
-            regression,
-            found: diagnosis.effects.into_iter().map(|effect| found(effect, &train[0].name)).collect(),
+            intervals: intervals(diagnosis, &train[0].name),
+            held_out: held_out(diagnosis, channel),
+            oracle: None,
+            regression: Vec::new(),
+            found: diagnosis.effects.iter().map(|effect| found(effect.clone(), &train[0].name)).collect(),
             seconds,
-        }
+        };
+        (trial, outcome)
     }
 }
 

@@ -8,7 +8,7 @@ use trueup::sim2real::Seed;
 use trueup::sim2real::diagnose::Verdict;
 
 fn tried(seed: u64, index: usize) -> Trial {
-    Case::draw(Domain::Market, Seed(seed), index).tried(&|| 0.0).unwrap()
+    Case::draw(Domain::Market, Seed(seed), index).answered().unwrap()
 }
 
 fn names(trial: &Trial) -> Vec<&str> {
