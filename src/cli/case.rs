@@ -6,9 +6,9 @@ use crate::io::{InputError, TwinFile, hint_among};
 use crate::market::{LogReader, check_needs, execution_assembly};
 use crate::robot::{
     cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
-    tanks_assembly, tanks_recordings,
+    tanks_assembly, tanks_recordings, unread_columns,
 };
-use crate::sim2real::diagnose::{Calibration, Verdict, calibrate, diagnose};
+use crate::sim2real::diagnose::{Calibration, Unread, Verdict, calibrate, diagnose_beside};
 use crate::sim2real::{Assembly, Parameter, Plant, Recording, Seed, Simulator};
 
 use super::diagnosed::Diagnosed;
@@ -42,6 +42,8 @@ struct Given<P: Plant> {
     twin: Assembly<P>,
     recordings: Vec<Recording<P::Stimulus>>,
     held_out: Vec<Recording<P::Stimulus>>,
+    /// What recordings have that the twin does not read. Of orders and fills every column has a meaning of its own.
+    unread: Vec<Unread>,
 }
 
 impl Case {
@@ -101,7 +103,7 @@ impl<P: Plant> Trial for Given<P> {
 
     fn diagnose(&self, seed: Seed, progress: &Progress) -> Diagnosed {
         let tell = |step: &str, done: usize, of: usize| progress.tell(step, done, of);
-        let outcome = diagnose(&self.twin, &self.recordings, &self.held_out, seed, &tell);
+        let outcome = diagnose_beside(&self.twin, &self.recordings, &self.held_out, &self.unread, seed, &tell);
         Diagnosed {
             file: self.file.clone(),
             trued: FittedTwin::of(&outcome.trued, &outcome.values, &outcome.std, &outcome.correlation),
@@ -135,28 +137,31 @@ impl<P: Plant> Trial for Given<P> {
 /// Reads the recordings at `recordings` and `held_out` as `twin` says.
 fn trial(twin: &TwinFile, recordings: &[PathBuf], held_out: &[PathBuf]) -> Result<Box<dyn Trial>, InputError> {
     let file = twin.clone();
+    let unread = if twin.model == "execution" { Vec::new() } else { unread_columns(twin, recordings) };
     Ok(match twin.model.as_str() {
         "joint" => Box::new(Given {
             file,
             twin: joint_assembly(twin)?,
             recordings: joint_recordings(twin, recordings)?,
             held_out: joint_recordings(twin, held_out)?,
+            unread,
         }),
         "cart_pole" => Box::new(Given {
             file,
             twin: cart_pole_assembly(twin)?,
             recordings: cart_pole_recordings(twin, recordings)?,
             held_out: cart_pole_recordings(twin, held_out)?,
+            unread,
         }),
         "tanks" => {
             let recordings = tanks_recordings(twin, recordings)?;
             let assembly = tanks_assembly(twin, &recordings)?;
-            Box::new(Given { file, twin: assembly, recordings, held_out: tanks_recordings(twin, held_out)? })
+            Box::new(Given { file, twin: assembly, recordings, held_out: tanks_recordings(twin, held_out)?, unread })
         }
         "equations" => {
             let recordings = equations_recordings(twin, recordings)?;
             let assembly = equations_assembly(twin, &recordings)?;
-            Box::new(Given { file, twin: assembly, recordings, held_out: equations_recordings(twin, held_out)? })
+            Box::new(Given { file, twin: assembly, recordings, held_out: equations_recordings(twin, held_out)?, unread })
         }
         "execution" => {
             let assembly = execution_assembly(twin)?;
@@ -165,7 +170,7 @@ fn trial(twin: &TwinFile, recordings: &[PathBuf], held_out: &[PathBuf]) -> Resul
             let (recordings, held_out) = (reader.read_all(recordings)?, reader.read_all(held_out)?);
             check_needs(twin, &recordings)?;
             check_needs(twin, &held_out)?;
-            Box::new(Given { file, twin: assembly, recordings, held_out })
+            Box::new(Given { file, twin: assembly, recordings, held_out, unread })
         }
         other => {
             let error = twin.error(&["twin", "model"], format!("there is no model `{other}`"));

@@ -35,5 +35,5 @@ use twin::assembly as twin_assembly;
 #[cfg(feature = "io")]
 pub use twin::{
     cart_pole_assembly, cart_pole_recordings, equations_assembly, equations_recordings, joint_assembly, joint_recordings,
-    tanks_assembly, tanks_recordings,
+    tanks_assembly, tanks_recordings, unread_columns,
 };

@@ -7,6 +7,7 @@ mod joint;
 #[cfg(test)]
 mod randomized;
 mod tanks;
+mod unread;
 
 use std::path::Path;
 
@@ -21,6 +22,7 @@ pub use cart_pole::{cart_pole_assembly, cart_pole_recordings};
 pub use equations::{equations_assembly, equations_recordings};
 pub use joint::{joint_assembly, joint_recordings};
 pub use tanks::{tanks_assembly, tanks_recordings};
+pub use unread::unread_columns;
 
 /// Rows a recording needs at the least: fewer say nothing about noise, let alone about what is missing.
 const FEWEST_ROWS: usize = 100;
@@ -237,11 +239,16 @@ fn read(path: &Path, columns: &Columns) -> Result<Samples, InputError> {
         Some(Measured { channel: seen.name.clone(), unit: seen.unit.clone(), samples })
     };
     Ok(Samples {
-        name: path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned()),
+        name: recording_name(path),
         driving: columns.driving.iter().map(|(role, _)| table.complete(role).unwrap_or_default()).collect(),
         measured: columns.seen.iter().filter_map(measured).collect(),
         time: table.time,
     })
+}
+
+/// What the recording at `path` is called.
+fn recording_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Refuses times that no motion can be followed in.

@@ -26,4 +26,5 @@ mod run_spy;
 mod session_scene;
 mod sweep;
 mod turns;
+mod unread;
 mod walk_forward;

@@ -85,6 +85,13 @@ fn place(diagnosis: &Diagnosis) -> String {
         let share = format!("{} of the error in {} of the rows", percent(bin.share_of_error), percent(bin.share_of_rows));
         text += &format!("  {}: {}: {share}\n", bin.channel, range(bin));
     }
+    for split in &location.columns {
+        let (at, explains) = (significant(split.at, 3), percent(split.explains));
+        text += &format!(
+            "  {}, a column the twin does not read: parameters of their own below and above {at} explain {explains} of the error\n",
+            split.column
+        );
+    }
     for stretch in location.intervals.iter().take(STRETCHES) {
         let (start, end) = (decimals(stretch.start, 2), decimals(stretch.end, 2));
         let share = percent(stretch.share_of_error);

@@ -39,7 +39,7 @@ impl Section for Place<'_> {
         let profiles: Vec<Value> = channels.iter().map(|first| self.profiles(first)).collect();
         let nothing =
             acted.is_empty() && location.intervals.is_empty() && location.against.is_empty() && location.changes.is_empty();
-        if nothing && location.onset.is_none() && profiles.is_empty() {
+        if nothing && location.columns.is_empty() && location.onset.is_none() && profiles.is_empty() {
             return Ok(String::new());
         }
         let intervals: Vec<Value> = location
@@ -71,6 +71,14 @@ impl Section for Place<'_> {
                 context! { channel => &bin.channel, range => range(bin), error => error, rows => rows }
             })
             .collect();
+        let columns: Vec<Value> = location
+            .columns
+            .iter()
+            .map(|split| {
+                let (at, explains) = (significant(split.at, 3), percent(split.explains));
+                context! { column => &split.column, at => at, explains => explains }
+            })
+            .collect();
         fill(
             "place.html",
             include_str!("../templates/place.html"),
@@ -79,6 +87,7 @@ impl Section for Place<'_> {
                 onset => location.onset.map(|t| with_unit(&significant(t, 4), "s")),
                 changes => changes,
                 against => against,
+                columns => columns,
                 profiles => profiles,
                 intervals => intervals,
                 more => location.intervals.len().saturating_sub(STRETCHES),

@@ -187,13 +187,14 @@ fn join_facts(facts: &mut Facts, more: Facts) {
 }
 
 fn join(whole: &mut Diagnosis, other: Diagnosis) {
-    let Where { intervals, onset, changes, against, recordings } = other.location;
+    let Where { intervals, onset, changes, against, columns, recordings } = other.location;
     whole.location.recordings.extend(recordings);
     whole.location.intervals.extend(intervals);
     whole.location.intervals.sort_by(|a, b| b.share_of_error.total_cmp(&a.share_of_error));
     whole.location.onset = whole.location.onset.or(onset);
     whole.location.changes.extend(changes);
     whole.location.against.extend(against);
+    whole.location.columns.extend(columns);
     for (name, change) in other.parameters {
         let better = whole.parameters.get(&name).is_none_or(|own| change.std < own.std);
         if better {

@@ -42,7 +42,7 @@ pub(super) fn beneath<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     selection: &Selection<T>,
     recordings: [&[Recording<T::Stimulus>]; 2],
-    found: &Found,
+    found: &Found<'_>,
     progress: Progress<'_>,
 ) -> Option<(Selection<T>, Vec<Place>)> {
     let counts = found.signs.step > 0.0 && inquiry.candidates.iter().any(|c| c.finishing);

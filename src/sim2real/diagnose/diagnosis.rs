@@ -156,9 +156,24 @@ pub struct Where {
     /// The states that hold most of the error, the most telling first.
     #[serde(default)]
     pub against: Vec<Bin>,
+    /// Columns that the twin does not read and that tell when its parameters are others, the most telling first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub columns: Vec<ColumnSplit>,
     /// Where there are several recordings, the errors of each on held-out data.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingError>,
+}
+
+/// A column that the twin does not read: with parameters of its own on either side of a value of it, it would err far less.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ColumnSplit {
+    /// The column.
+    pub column: String,
+    /// The value, in the column's unit.
+    pub at: f64,
+    /// The part, from 0 to 1, of the recalibrated twin's squared error above the noise that two sets of parameters explain, in windows that
+    /// start afresh.
+    pub explains: f64,
 }
 
 /// A time from which on the recalibrated twin errs more, or less, than before.

@@ -89,7 +89,7 @@ fn at_edge(parameters: &[Parameter], from: usize, findings: &Findings) -> usize 
 }
 
 /// What a sign in the recordings shows without a fit.
-pub(super) fn seen<T: Twin>(inquiry: &Inquiry<'_, T>, found: &Found, candidate: &Candidate) -> Effect {
+pub(super) fn seen<T: Twin>(inquiry: &Inquiry<'_, T>, found: &Found<'_>, candidate: &Candidate) -> Effect {
     let Found { signs, of_steps, lost, .. } = found;
     let losses = !of_steps.iter().any(|other| other.about.name == candidate.about.name);
     Effect {

@@ -279,14 +279,14 @@ pub(super) fn unevenness(values: &[f64], residual: &[f64]) -> f64 {
 }
 
 /// Numbers of the rows that have a value, by value.
-fn sorted(values: &[f64]) -> Vec<usize> {
+pub(super) fn sorted(values: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..values.len()).filter(|i| values[*i].is_finite()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     order
 }
 
 /// Quantile bins of rows sorted by their values; equal values stay together.
-fn quantile_bins<'a>(order: &'a [usize], values: &[f64]) -> Vec<&'a [usize]> {
+pub(super) fn quantile_bins<'a>(order: &'a [usize], values: &[f64]) -> Vec<&'a [usize]> {
     let mut bins = Vec::new();
     let mut from = 0;
     for k in 1..=BINS {

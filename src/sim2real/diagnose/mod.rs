@@ -8,7 +8,7 @@
 //! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out; the `decision`
 //! rests on all of it, and `verdict` and `words` tell it. `gates` says how long steps of integration may be, and `recognize` sees what needs no
 //! fit. `locate` and `onset` say where and since when the twin is off, `activity` when what was named acted, and `experiment`
-//! designs, from the commands of `excitation`, what to record where rivals are left. Where recordings show several things that no
+//! designs, from the commands of `excitation`, what to record where rivals are left; `unread` asks what the twin does not read of them. Where recordings show several things that no
 //! mechanism has in common, each of these `aspects` goes through all of it by itself.
 
 mod activity;
@@ -47,14 +47,15 @@ mod select;
 mod settle;
 mod structure;
 mod uncertainty;
+mod unread;
 mod verdict;
 mod weigh;
 mod whiteness;
 mod words;
 
 pub use diagnosis::{
-    Bin, Change, ChannelFit, Checks, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment, ParameterChange,
-    RecordingError, Rival, SCHEMA, Score, Stretch, Verdict, Where,
+    Bin, Change, ChannelFit, Checks, ColumnSplit, Diagnosis, Effect, Estimate, Interval, Moved, NextExperiment,
+    ParameterChange, RecordingError, Rival, SCHEMA, Score, Stretch, Verdict, Where,
 };
 pub use evidence::{Evidence, HELD_OUT, settled};
 pub use excitation::Excitation;
@@ -62,6 +63,7 @@ pub use experiment::EXPERIMENT_FILE;
 pub use hypothesis::Hypothesis;
 pub use noise::channel_weights;
 pub use profile::Profile;
+pub use unread::Unread;
 
 use nalgebra::DMatrix;
 
@@ -152,11 +154,24 @@ pub fn diagnose<T: Twin>(
     seed: Seed,
     progress: Progress<'_>,
 ) -> Outcome<T> {
+    diagnose_beside(twin, recordings, held_out, &[], seed, progress)
+}
+
+/// The same, where the recordings have columns that the twin does not read: those that tell where it errs are told.
+#[must_use]
+pub fn diagnose_beside<T: Twin>(
+    twin: &T,
+    recordings: &[Recording<T::Stimulus>],
+    held_out: &[Recording<T::Stimulus>],
+    unread: &[Unread],
+    seed: Seed,
+    progress: Progress<'_>,
+) -> Outcome<T> {
     let aspects = aspects::split(twin, recordings, held_out);
-    let mut each = aspects.iter().map(|aspect| of_one(twin, &aspect.recordings, &aspect.held_out, seed, progress));
+    let mut each = aspects.iter().map(|aspect| of_one(twin, &aspect.recordings, &aspect.held_out, unread, seed, progress));
     match each.next() {
         Some(first) => aspects::joined(twin, first, each.collect()),
-        None => of_one(twin, recordings, held_out, seed, progress).outcome,
+        None => of_one(twin, recordings, held_out, unread, seed, progress).outcome,
     }
 }
 
@@ -184,13 +199,14 @@ fn of_one<T: Twin>(
     twin: &T,
     recordings: &[Recording<T::Stimulus>],
     held_out: &[Recording<T::Stimulus>],
+    unread: &[Unread],
     seed: Seed,
     progress: Progress<'_>,
 ) -> Answered<T> {
     let signs = recognize::signs(twin, recordings);
     let lost = recognize::lost(twin, recordings);
     let of_steps = twin.recognized(&Signs { repeated: 0.0, run: 0.0, ..signs });
-    let found = Found { signs, of: twin.recognized(&signs), of_steps, lost };
+    let found = Found { signs, of: twin.recognized(&signs), of_steps, lost, unread };
     let channel = twin.channels().first().map(|c| c.name.clone()).unwrap_or_default();
     let cleaned =
         (signs.repeated > 0.0).then(|| [recordings, held_out].map(|all| recognize::without_repeats(twin, all, &channel)));
@@ -199,13 +215,15 @@ fn of_one<T: Twin>(
 }
 
 /// What the recordings show by themselves.
-pub(super) struct Found {
+pub(super) struct Found<'a> {
     signs: Signs,
     of: Vec<Candidate>,
     /// Those that would be recognized if no sample had been lost.
     of_steps: Vec<Candidate>,
     /// When samples were lost.
     lost: Vec<Stretch>,
+    /// What the twin does not read of them.
+    unread: &'a [Unread],
 }
 
 /// The same of a twin that is followed, beside what was found without following it.
@@ -213,7 +231,7 @@ fn answered<T: Twin>(
     twin: &T,
     recordings: &[Recording<T::Stimulus>],
     held_out: &[Recording<T::Stimulus>],
-    found: &Found,
+    found: &Found<'_>,
     seed: Seed,
     progress: Progress<'_>,
 ) -> Answered<T> {
@@ -226,7 +244,7 @@ fn followed(
     twin: &AnyTwin,
     recordings: &[Recording<AnyStimulus>],
     held_out: &[Recording<AnyStimulus>],
-    found: &Found,
+    found: &Found<'_>,
     seed: Seed,
     progress: Progress<'_>,
 ) -> Answered<AnyTwin> {
@@ -241,7 +259,7 @@ fn as_stamped(
     twin: &AnyTwin,
     recordings: &[Recording<AnyStimulus>],
     held_out: &[Recording<AnyStimulus>],
-    found: &Found,
+    found: &Found<'_>,
     seed: Seed,
     progress: Progress<'_>,
 ) -> (Answered<AnyTwin>, Option<Candidate>) {
@@ -317,6 +335,9 @@ fn as_stamped(
     verdict::recognized(&mut diagnosis, &inquiry, found, &seen);
     progress("saying where", 0, 1);
     diagnosis.location = locate::located(&inquiry, &selection.recalibrated, &covariates);
+    if diagnosis.verdict != Verdict::NoMismatch {
+        diagnosis.location.columns = unread::splits(&inquiry, &selection.recalibrated, &covariates, found.unread);
+    }
     diagnosis.location.recordings = by_recording::by_recording(&comparisons);
     let activities = activity::activities(&inquiry, &selection.selected, &trued, &covariates);
     activity::tell(&mut diagnosis, &inquiry, &selection.selected, activities);

@@ -38,11 +38,11 @@ pub(super) struct Onset {
 
 /// A row of the regression of residuals on what parameters can change in them.
 #[derive(Debug, Clone)]
-struct Row {
-    time: f64,
-    channel: usize,
-    residual: f64,
-    derivatives: Vec<f64>,
+pub(super) struct Row {
+    pub time: f64,
+    pub channel: usize,
+    pub residual: f64,
+    pub derivatives: Vec<f64>,
 }
 
 /// The clearest change in the residuals of `hypothesis`, where one is clear.
@@ -102,8 +102,8 @@ fn change(rows: &[Row]) -> Option<(f64, f64)> {
         (*at, explained)
     });
     let (at, _) = dates.collect::<Vec<_>>().into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let gain = gain(rows, &columns, at)?;
-    (gain > ACCEPT).then(|| (rows[at].time, gain))
+    let (gain, explains) = gain(rows, &columns, at)?;
+    (gain > ACCEPT && explains.is_none_or(|part| part > EXPLAINS)).then(|| (rows[at].time, gain))
 }
 
 /// Residuals and derivatives, each channel brought to the size of its misfit and each column to length 1.
@@ -168,9 +168,21 @@ fn left(columns: &Columns, from: usize, to: usize) -> DVector<f64> {
     target - design * (&eigen.eigenvectors * along)
 }
 
-/// The gain of a change at row `at`, where it explains enough; as in selection, by the evidence that the residuals of
-/// the alternative hold.
-fn gain(rows: &[Row], columns: &Columns, at: usize) -> Option<f64> {
+/// The gain of two sets of parameters, one for the rows before `at` and one for the others, and what they explain of the misfit above the
+/// noise; none where nothing is above it, or either side is too short.
+pub(super) fn parted(rows: &[Row], at: usize) -> Option<(f64, f64)> {
+    let columns = standardized(rows)?;
+    let shortest = ((SHORTEST * rows.len() as f64) as usize).max(3 * columns.design.ncols());
+    if !(shortest..rows.len().saturating_sub(shortest)).contains(&at) {
+        return None;
+    }
+    let (gain, explains) = gain(rows, &columns, at)?;
+    Some((gain, explains?))
+}
+
+/// The gain of a change at row `at`, and what it explains of the misfit above the noise, where there is any; as in selection, by the
+/// evidence that the residuals of the alternative hold.
+fn gain(rows: &[Row], columns: &Columns, at: usize) -> Option<(f64, Option<f64>)> {
     let count = rows.len();
     let one = left(columns, 0, count);
     let two: Vec<f64> = left(columns, 0, at).iter().chain(left(columns, at, count).iter()).copied().collect();
@@ -193,7 +205,8 @@ fn gain(rows: &[Row], columns: &Columns, at: usize) -> Option<f64> {
         remaining += (squares(&after) - noise).max(0.0);
     }
     let free = columns.design.ncols() + 1;
-    (remaining < (1.0 - EXPLAINS) * misfit || misfit == 0.0).then(|| gain - free as f64 * effective.ln())
+    let explains = (misfit > 0.0).then(|| 1.0 - remaining / misfit);
+    Some((gain - free as f64 * effective.ln(), explains))
 }
 
 /// Reaches of the search around a first date, as parts of a recording, and dates tried in each.

@@ -77,7 +77,7 @@ pub(super) fn facts<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> w
 pub(super) fn recognized<T: Twin>(
     diagnosis: &mut Diagnosis,
     inquiry: &Inquiry<'_, T>,
-    of_what: &Found,
+    of_what: &Found<'_>,
     found: &[&Candidate],
 ) {
     if found.is_empty() {
