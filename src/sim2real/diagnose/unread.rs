@@ -19,6 +19,8 @@ const WINDOWS: f64 = 60.0;
 const MOST_ROWS: usize = 6_000;
 /// A column is told that explains this part of the misfit above the noise: beside what else is missing it need not be most of it.
 const EXPLAINS: f64 = 0.3;
+/// A column, or a state, of which less than this part of the rows has a value is not asked.
+const KNOWN: f64 = 0.9;
 /// Columns that are told.
 const TOLD: usize = 2;
 
@@ -68,11 +70,12 @@ pub(super) fn splits<T: Twin>(
     let known = states.into_iter().flat_map(|name| [own(name), size(own(name))]);
     let known = known.chain([rows.iter().map(|row| row.of.time).collect()]);
     let most = known.filter_map(|values| best(&rows, &values)).map(|split| split.gain).fold(0.0, f64::max);
+    let tried = names.len() as f64;
     let mut found: Vec<(f64, ColumnSplit)> = Vec::new();
     for name in names {
         let Some(split) = best(&rows, &of_column(name)) else { continue };
         // As many were tried.
-        if split.explains > EXPLAINS && split.gain - 2.0 * (columns.len() as f64).ln() > ACCEPT && split.gain > most {
+        if split.explains > EXPLAINS && split.gain - 2.0 * tried.ln() > ACCEPT && split.gain > most {
             found.push((split.gain, ColumnSplit { column: name.to_owned(), at: split.at, explains: split.explains }));
         }
     }
@@ -129,10 +132,11 @@ struct Split {
     explains: f64,
 }
 
-/// The value of those between quantiles at which two sets of parameters explain most, where one is clear; none where a row has no value.
+/// The value of those between quantiles at which two sets of parameters explain most, of the rows that have one; none where there
+/// is no such value, or too few rows have any.
 fn best(rows: &[Placed], values: &[f64]) -> Option<Split> {
     let order = sorted(values);
-    if order.len() < rows.len() {
+    if (order.len() as f64) < KNOWN * rows.len() as f64 {
         return None;
     }
     let bins = quantile_bins(&order, values);
@@ -140,7 +144,8 @@ fn best(rows: &[Placed], values: &[f64]) -> Option<Split> {
     let splits = bins.windows(2).filter_map(|pair| {
         let at = border(pair)?;
         // In the order of time on either side.
-        let (below, above): (Vec<usize>, Vec<usize>) = (0..rows.len()).partition(|k| values[*k] < at);
+        let (below, above): (Vec<usize>, Vec<usize>) =
+            (0..rows.len()).filter(|k| values[*k].is_finite()).partition(|k| values[*k] < at);
         let in_turn: Vec<Row> = below.iter().chain(&above).map(|k| rows[*k].of.clone()).collect();
         let (gain, explains) = parted(&in_turn, below.len())?;
         Some(Split { at, gain, explains })
@@ -188,12 +193,22 @@ mod tests {
     }
 
     #[test]
+    fn a_few_holes_hide_nothing() {
+        let with_holes = column(|row| if row.is_multiple_of(50) { f64::NAN } else { f64::from(!off(row)) });
+        let found = best(&rows(20.0, off), &with_holes).unwrap();
+        assert!(found.at == 0.5 && found.explains > 0.95, "{} {}", found.at, found.explains);
+    }
+
+    #[test]
     fn a_column_that_has_nothing_to_do_with_them_gains_nothing() {
         let rows = rows(20.0, off);
         let blinks = best(&rows, &column(|row| f64::from((row / 211).is_multiple_of(2)))).unwrap();
         assert!(blinks.explains < 0.1, "{}", blinks.explains);
         assert!(best(&rows, &column(|_| 7.3)).is_none(), "what never changes parts nothing");
-        assert!(best(&rows, &column(|row| if row == 7 { f64::NAN } else { row as f64 })).is_none(), "nor what has holes");
+        assert!(
+            best(&rows, &column(|row| if row.is_multiple_of(3) { f64::NAN } else { row as f64 })).is_none(),
+            "nor what has holes in a third of its rows"
+        );
     }
 
     #[test]
