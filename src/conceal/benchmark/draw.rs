@@ -10,6 +10,7 @@ use super::excitation::{Excitation, Swing, driven};
 use super::label::Label;
 use super::motion::{Drive, Machine, Motion, Precision};
 use super::recipe::{FOREIGN, KNOWN, Recipe, UNREACHED, compatible, need};
+use super::refit::Refit;
 use super::scene::Scales;
 use super::sensor::{Noise, Sensor};
 use super::size::{Hideable, strength};
@@ -220,6 +221,9 @@ impl Set {
                 None => return Err(None),
             }
         }
+        if plan.kind != Kind::NotExcited && (0..dosed.len()).any(|k| self.hides(&dosed, k, &hideable)) {
+            return Err(None);
+        }
         let measured = self.sizes(&dosed, &noise, &hideable);
         let wanted = |size: &f64| plan.kind == Kind::NotExcited || (SIZES.0 * 0.9..SIZES.1 * 1.2).contains(size);
         if measured.iter().all(wanted) { Ok(dosed) } else { Err(Some(dosed)) }
@@ -229,16 +233,27 @@ impl Set {
         Hideable::of(self.arm, &self.drives[0], self.scales.reach, self.scales.speed)
     }
 
+    /// Whether another arm does without effect number `k` most of what that does.
+    fn hides(&self, dosed: &[Dosed], k: usize, hideable: &Hideable) -> bool {
+        let all = self.effects(dosed);
+        let others = [&all[..k], &all[k + 1..]].concat();
+        let scales = [self.scales.reach, self.scales.speed];
+        let seed = self.seed.child(RECORDINGS[0]);
+        Refit { arm: self.arm, effects: &others, drive: &self.drives[0], seed, scales }.hides(&all, hideable)
+    }
+
+    /// What is rehearsed of all effects but number `k`.
+    fn beside(&self, dosed: &[Dosed], k: usize, noise: &[f64]) -> (Vec<f64>, Motion) {
+        let others = dosed.iter().enumerate().filter(|(other, _)| *other != k);
+        let others: Vec<Dosed> = others.map(|(_, dosed)| dosed.clone()).collect();
+        self.rehearsed(&self.effects(&others), noise)
+    }
+
     /// The size of each effect beside the others.
     fn sizes(&self, dosed: &[Dosed], noise: &[f64], hideable: &Hideable) -> Vec<f64> {
         let (with, _) = self.rehearsed(&self.effects(dosed), noise);
-        (0..dosed.len())
-            .map(|k| {
-                let others: Vec<Dosed> =
-                    dosed.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, dosed)| dosed.clone()).collect();
-                hideable.size(&with, &self.rehearsed(&self.effects(&others), noise).0, self.sigma())
-            })
-            .collect()
+        let size = |k: usize| hideable.size(&with, &self.beside(dosed, k, noise).0, self.sigma());
+        (0..dosed.len()).map(size).collect()
     }
 
     /// The effects in a recording: those of a case, but for a mass that is put on in the test alone.

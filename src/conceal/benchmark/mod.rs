@@ -13,6 +13,7 @@ mod label;
 mod load;
 mod motion;
 mod recipe;
+mod refit;
 mod scene;
 mod sensor;
 mod size;
