@@ -83,6 +83,8 @@ impl From<Domain> for Concealing {
     }
 }
 
+/// Threads of a diagnosis: its time is told of two cores.
+const THREADS: usize = 2;
 /// The files that appear at the end.
 const FILES: [&str; 4] = ["summary.json", "figures.md", "README.md", "report.html"];
 
@@ -133,8 +135,8 @@ impl Prove {
 
 /// Diagnoses what `record` does not hold yet. Cases are begun in order and written in order.
 ///
-/// Each thread of the pool works on a case of its own: were the cases tasks of one parallel loop, a diagnosis that waits for
-/// a part of its own might be given another case to do meanwhile, and its time would be that of both.
+/// As many are under way at once as have [`THREADS`] each, in a pool of their own: were the cases tasks of one parallel loop, a diagnosis
+/// that waits for a part of its own might be given another case to do meanwhile, and its time would be that of both.
 fn diagnosed(cases: &Cases, sealed: &[Sealed], record: &Record, progress: &Progress) -> Result<(), Stop> {
     let clock = Instant::now();
     let next = AtomicUsize::new(record.done());
@@ -159,7 +161,11 @@ fn diagnosed(cases: &Cases, sealed: &[Sealed], record: &Record, progress: &Progr
             }
         }
     };
-    rayon::scope(|scope| (0..rayon::current_num_threads()).for_each(|_| scope.spawn(|_| work())));
+    let threads = rayon::current_num_threads();
+    let pool = || rayon::ThreadPoolBuilder::new().num_threads(THREADS.min(threads)).build();
+    let pools: Result<Vec<_>, _> = (0..(threads / THREADS).max(1)).map(|_| pool()).collect();
+    let pools = pools.map_err(|error| Stop::Bug(format!("no threads to diagnose with: {error}")))?;
+    std::thread::scope(|scope| pools.iter().for_each(|pool| drop(scope.spawn(|| pool.install(work)))));
     match waiting.into_inner().map(|waiting| waiting.failed) {
         Ok(None) => Ok(()),
         Ok(Some(stop)) => Err(stop),

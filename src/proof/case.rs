@@ -54,14 +54,13 @@ impl Case {
             Self::Joint(case) => {
                 let names = names(&case.label.effects);
                 let names: Vec<&str> = names.iter().map(String::as_str).collect();
-                Ok(joint::given(case).tried(&names, joint::regression(case), clock))
+                Ok(joint::given(case).tried(&names, || joint::regression(case), clock))
             }
             Self::Trading(case) => {
                 let names = names(&case.label.effects);
                 let names: Vec<&str> = names.iter().map(String::as_str).collect();
                 let given = trading::given(case)?;
-                let regression = trading::regression(&given.train[0]);
-                Ok(given.tried(&names, regression, clock))
+                Ok(given.tried(&names, || trading::regression(&given.train[0]), clock))
             }
         }
     }

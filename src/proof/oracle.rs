@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::trial::{Fitted, finite};
@@ -39,16 +40,17 @@ pub(super) fn oracle<P: Plant>(
     channel: &str,
     diagnosed: &Outcome<Assembly<P>>,
 ) -> Option<OracleFit> {
-    let bare = calibrate(twin, train, test, Seed(0), &|_, _, _| {});
+    let bare = || calibrate(twin, train, test, Seed(0), &|_, _, _| {});
     if names.is_empty() {
-        return Some(OracleFit { held_out: held_out(&bare, channel), parameters: Vec::new() });
+        return Some(OracleFit { held_out: held_out(&bare(), channel), parameters: Vec::new() });
     }
     let known: Vec<String> = twin.registry().iter().map(|row| row.about().name.to_owned()).collect();
     if !names.iter().all(|name| known.iter().any(|known| known == name)) {
         return None;
     }
     let others: Vec<String> = known.into_iter().filter(|known| !names.contains(&known.as_str())).collect();
-    let told = diagnose(&twin.clone().excluding(&others), train, test, Seed(0), &|_, _, _| {});
+    let of_these = twin.clone().excluding(&others);
+    let (bare, told) = rayon::join(bare, || diagnose(&of_these, train, test, Seed(0), &|_, _, _| {}));
     let mut attempts: Vec<Attempt> =
         [diagnosed, &told].into_iter().filter_map(|outcome| as_found(outcome, names, channel)).collect();
     if as_found(&told, names, channel).is_none() {
@@ -101,7 +103,8 @@ fn as_fitted<P: Plant>(
         let parameters = parameters.collect();
         (learnt(&fit.comparisons, |c| &c.recalibrated), OracleFit { held_out: held_out(&fit, channel), parameters })
     };
-    starts.into_iter().take(FITS).map(fit).collect()
+    starts.truncate(FITS);
+    starts.into_par_iter().map(fit).collect()
 }
 
 /// Error at a start, the twin, its mechanisms and the values of their parameters there.

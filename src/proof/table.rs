@@ -32,7 +32,7 @@ pub(super) fn figures(domain: Domain, entries: &[Entry], reliability: &Reliabili
     };
     all.push(chance.meaning("what it comes to of as many names that are right just as often as their confidences say"));
     let seconds = Figure::quantile("time of a diagnosis", Unit::Seconds, 0.5, entries.iter().map(|e| e.trial.seconds));
-    all.push(seconds.meaning("median, with as many under way at once as there are threads").wanting(goals.seconds));
+    all.push(seconds.meaning("median, on two threads").wanting(goals.seconds));
     all.extend(further(&entries));
     all
 }

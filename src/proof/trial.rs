@@ -85,12 +85,18 @@ pub(super) struct Given<P: Plant> {
 }
 
 impl<P: Plant> Given<P> {
-    /// Diagnoses it; the oracle alone is told the `names`, and only then. `regression` is what the baseline names, and `clock`
+    /// Diagnoses it; the oracle alone is told the `names`, and only then. `regression` says what the baseline names, and `clock`
     /// gives a time [s].
-    pub fn tried(&self, names: &[&str], regression: Vec<String>, clock: &(dyn Fn() -> f64 + Sync)) -> Trial {
+    pub fn tried(
+        &self,
+        names: &[&str],
+        regression: impl FnOnce() -> Vec<String> + Send,
+        clock: &(dyn Fn() -> f64 + Sync),
+    ) -> Trial {
         let Self { twin, train, test, channel } = self;
         let (trial, outcome) = self.answered(clock);
-        Trial { oracle: oracle(twin, train, test, names, channel, &outcome), regression, ..trial }
+        let (regression, oracle) = rayon::join(regression, || oracle(twin, train, test, names, channel, &outcome));
+        Trial { oracle, regression, ..trial }
     }
 
     /// Diagnoses it, and asks no other.
