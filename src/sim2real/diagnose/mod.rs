@@ -35,6 +35,7 @@ mod needed;
 mod no_law;
 mod noise;
 mod onset;
+mod periodic;
 mod profile;
 mod prove;
 mod recognize;
@@ -318,7 +319,7 @@ fn as_stamped(
         of_no_law,
         // What recordings have of their own, as what orders foresaw, may be what the fitted ones tell of.
         few_tell: decision::few_tell(&comparisons) && trued.state.values.iter().all(Vec::is_empty),
-        contradiction: decision::contradiction(&inquiry, &selection.selected),
+        contradiction: decision::contradiction(&inquiry, &selection.selected, &comparisons),
         followed: remainder::followed(&trued, &selection.selected),
         dependence: remainder::strongest(&depends),
         foretold: remainder::foretold(&inquiry, &selection.selected),
