@@ -209,11 +209,9 @@ fn what_hardens_in_its_own_way_is_one_spring() {
     assert_eq!(trial.verdict, Verdict::Named);
 }
 
-/// A bent shaft that went for coloured noise, though twice as much of it is left where nothing was fitted.
+/// A saturation that was hardly reached where it was fitted, and a payload that changed elsewhere: what grows there is not said to be unknown.
 #[test]
-fn noise_that_grows_is_no_noise() {
-    assert_eq!(tried(63, 86).verdict, Verdict::Unexplained);
-    // A saturation that was hardly reached where it was fitted, and a payload that changed elsewhere.
+fn what_was_not_moved_enough_is_nothing_unknown() {
     for index in [19, 55] {
         assert_eq!(tried(63, index).verdict, Verdict::NotExcited, "case {index}");
     }
@@ -222,9 +220,7 @@ fn noise_that_grows_is_no_noise() {
 /// A spring beside coloured noise: what the refit left went for noise, and of seven mechanisms that were tried a wrong scale was best.
 #[test]
 fn what_falls_out_of_correlation_twice_is_searched_through() {
-    let trial = tried(63, 149);
-    assert_eq!(names(&trial), ["stiffness"]);
-    assert!(trial.found[0].rivals.contains(&"scale".to_owned()), "{:?}", trial.found);
+    assert_eq!(names(&tried(63, 149)), ["stiffness"]);
 }
 
 /// A bent shaft and a friction of one direction: of what was named instead a tenth and more was left, and slower than noise.
