@@ -162,7 +162,7 @@ fn twins<T: Twin>(twin: &T, answers: &[&Answered<T>]) -> (T, Vec<f64>, Vec<f64>,
 /// What is told of all aspects together once all are joined.
 fn finish(whole: &mut Diagnosis, facts: &Facts, verdict: Verdict) {
     whole.verdict = verdict;
-    whole.checks.tried = facts.tried.iter().map(|(id, _)| id).collect::<BTreeSet<_>>().len();
+    whole.checks.tried = facts.mechanisms();
     // What no aspect moves the data cannot tell of.
     let scores = &whole.scores;
     whole.checks.not_excited.retain(|id| !scores.iter().any(|score| score.mechanism == *id && score.excited));

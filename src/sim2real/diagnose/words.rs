@@ -1,5 +1,7 @@
 //! The words for a verdict.
 
+use std::collections::BTreeSet;
+
 use super::diagnosis::{ChannelFit, Effect, Verdict};
 use super::structure::Dependence;
 
@@ -20,6 +22,13 @@ pub(super) struct Facts {
     pub dependence: Option<Dependence>,
     /// What the recordings say against what they are taken to have begun with.
     pub contradiction: Option<String>,
+}
+
+impl Facts {
+    /// How many mechanisms were tried, in however many forms.
+    pub fn mechanisms(&self) -> usize {
+        self.tried.iter().map(|(id, _)| id).collect::<BTreeSet<_>>().len()
+    }
 }
 
 /// The answer, in one sentence.
@@ -73,7 +82,7 @@ pub(super) fn summary(facts: &Facts, verdict: Verdict, effects: &[Effect]) -> St
         ),
         Verdict::Unexplained if effects.is_empty() => format!(
             "Something is missing from the {name} that none of the {} known mechanisms explains{}.",
-            facts.tried.len(),
+            facts.mechanisms(),
             shape(facts)
         ),
         Verdict::Unexplained => {
@@ -212,7 +221,7 @@ mod tests {
     fn where_chance_cannot_be_excluded_the_channel_that_falls_is_told() {
         let facts = |contradiction: Option<&str>| Facts {
             name: "execution".into(),
-            tried: Vec::new(),
+            tried: vec![("bias", "a zero offset"), ("drift", "a drift"), ("drift", "a drift")],
             fits: vec![fit("cost", "", [0.5, 0.5]), fit("filled", "", [0.01, 0.002])],
             few: false,
             remainder: 0.0,
@@ -227,7 +236,7 @@ mod tests {
         let named = summary(&late, Verdict::Ambiguous, &[]);
         assert!(named.contains("error of filled falls by 80 %"), "a thousandth of the first is nothing: {named}");
         let said = summary(&facts(Some("others follow")), Verdict::Unexplained, &[]);
-        assert!(said.ends_with("explains: others follow."), "{said}");
+        assert!(said.ends_with("none of the 2 known mechanisms explains: others follow."), "a form is no mechanism: {said}");
     }
 
     #[test]
