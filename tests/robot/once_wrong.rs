@@ -348,3 +348,16 @@ fn one_of_several_delays_is_there_though_nobody_can_tell_which() {
     assert!(it("command_delay") && it("actuator_lag") && it("observation_delay"), "{:?}", trial.found);
     assert_eq!((trial.found.len(), trial.verdict), (2, Verdict::Ambiguous));
 }
+
+/// A spring of which the straight part ended at nothing is a cubic one.
+#[test]
+fn a_law_that_ended_at_a_bound_goes_by_the_name_it_has_there() {
+    assert_eq!(names(&tried(75, 177)), ["cubic_stiffness", "dead_zone"]);
+}
+
+/// Friction that falls with speed, beside a load that is most of the misfit: what the fall explains is a small share of that, and beyond
+/// all doubt.
+#[test]
+fn what_evidence_leaves_no_doubt_of_is_not_slight() {
+    assert_eq!(names(&tried(75, 137)), ["constant_load", "stribeck_friction"]);
+}

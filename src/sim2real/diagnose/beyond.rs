@@ -46,7 +46,7 @@ impl Opened {
         (number, form): (usize, &Candidate),
     ) -> Option<Self> {
         let own = selected.added[place];
-        let values = &selected.fit.values[own_values(inquiry, selected, place)];
+        let values = &selected.fit.values[inquiry.of_mechanism(selected, place)];
         let known = &inquiry.candidates[own].form.parameters;
         let mut form = form.clone();
         let mut open = false;
@@ -73,7 +73,7 @@ impl Opened {
             twin = twin.with(if k == place { &self.form } else { &inquiry.candidates[*number] });
         }
         let mut values = selected.fit.values.clone();
-        values.splice(own_values(inquiry, selected, place), self.start.iter().copied());
+        values.splice(inquiry.of_mechanism(selected, place), self.start.iter().copied());
         inquiry.begun(twin, added, &values, Some(&selected.fit.state), Effort::Thorough)
     }
 
@@ -85,7 +85,7 @@ impl Opened {
         selected: &Hypothesis<T>,
         place: usize,
     ) -> bool {
-        let from = own_values(inquiry, selected, place).start;
+        let from = inquiry.of_mechanism(selected, place).start;
         let within = &inquiry.candidates[self.number].form.parameters;
         within.iter().zip(&further.fit.values[from..]).any(|(p, value)| *value < p.lower || *value > p.upper)
     }
@@ -100,11 +100,4 @@ fn edge(parameter: &Parameter, [lower, upper]: &[f64; 2], fitted: Option<f64>) -
         (true, false) => Some(parameter.lower),
         (false, false) => None,
     }
-}
-
-/// Where the parameters of the `place`-th law of `selected` stand.
-fn own_values<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, place: usize) -> std::ops::Range<usize> {
-    let count = |number: &usize| inquiry.candidates[*number].form.parameters.len();
-    let from = inquiry.twin.parameters().len() + selected.added[..place].iter().map(count).sum::<usize>();
-    from..from + count(&selected.added[place])
 }

@@ -1,5 +1,7 @@
 //! A hypothesis: the twin with some mechanisms added, fitted as well as it goes.
 
+use std::ops::Range;
+
 use super::evidence::Evidence;
 use super::screen::{Screened, signatures};
 use super::weigh::squares;
@@ -134,6 +136,19 @@ impl<T: Twin> Inquiry<'_, T> {
         self.fitted(twin, added, &starts, Some(&less.fit.state), effort)
     }
 
+    /// Of all parameters of `whole`, those of its `place`-th mechanism.
+    pub fn of_mechanism(&self, whole: &Hypothesis<T>, place: usize) -> Range<usize> {
+        let count = |number: &usize| self.candidates[*number].form.parameters.len();
+        let from = self.twin.parameters().len() + whole.added[..place].iter().map(count).sum::<usize>();
+        from..from + count(&whole.added[place])
+    }
+
+    /// Whether a parameter of the `place`-th mechanism of `whole` ended at a bound.
+    pub fn at_a_bound(&self, whole: &Hypothesis<T>, place: usize) -> bool {
+        let own = self.of_mechanism(whole, place);
+        whole.fit.at_bound.iter().any(|parameter| own.contains(parameter))
+    }
+
     /// Where `whole` stands, with another of its mechanisms at its most promising start instead of the one that `less` lacks, and
     /// with what both call alike as it was.
     fn in_place(&self, whole: &Hypothesis<T>, less: &Hypothesis<T>, screened: &Screened) -> Option<Vec<f64>> {
@@ -142,8 +157,7 @@ impl<T: Twin> Inquiry<'_, T> {
             others.eq(less.added.iter().copied())
         })?;
         let count = |number: &usize| self.candidates[*number].form.parameters.len();
-        let from = self.twin.parameters().len() + whole.added[..place].iter().map(count).sum::<usize>();
-        let own = from..from + count(&whole.added[place]);
+        let own = self.of_mechanism(whole, place);
         let mut values = whole.fit.values[..own.start].to_vec();
         values.extend_from_slice(&whole.fit.values[own.end..]);
         values.extend_from_slice(screened.starts.first()?.get(values.len()..)?);
@@ -202,6 +216,11 @@ impl<T: Twin> Inquiry<'_, T> {
         self.weighed(twin, added, fit, &blocks)
     }
 
+    /// The twin with what was `added`, with this inquiry's step of integration.
+    fn with(&self, added: &[usize]) -> T {
+        added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]))
+    }
+
     /// `hypothesis` refitted with this inquiry's step of integration, from where it stands.
     pub fn refitted(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
         self.followed_on(hypothesis, Effort::Thorough)
@@ -209,15 +228,14 @@ impl<T: Twin> Inquiry<'_, T> {
 
     /// The same, as far as `effort` goes.
     pub fn followed_on(&self, hypothesis: &Hypothesis<T>, effort: Effort) -> Hypothesis<T> {
-        let twin = hypothesis.added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]));
         let Hypothesis { added, fit, .. } = hypothesis;
-        self.begun(twin, added.clone(), &fit.values, Some(&fit.state), effort)
+        self.begun(self.with(added), added.clone(), &fit.values, Some(&fit.state), effort)
     }
 
     /// `hypothesis` refitted where the recordings are divided in another way than they were for it.
     pub fn refitted_afresh(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
-        let Hypothesis { twin, added, fit, .. } = hypothesis;
-        self.begun(twin.clone(), added.clone(), &fit.values, None, Effort::Thorough)
+        let Hypothesis { added, fit, .. } = hypothesis;
+        self.begun(self.with(added), added.clone(), &fit.values, None, Effort::Thorough)
     }
 
     /// `twin`, which has what is `added`, fitted from these `values` on, and from `state` if that is known of the same parts.
