@@ -8,6 +8,7 @@
 
 use std::collections::BTreeMap;
 
+use super::gates;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::noise::median;
 use super::rivals::{self, Place};
@@ -51,7 +52,7 @@ pub(super) fn beneath<T: Twin>(
     }
     let crossings = Crossings::of(inquiry.twin, recordings, found.signs.step)?;
     let sought = |late| crossings.sought(inquiry, selection, late, progress);
-    let (by_steps, besides) = (sought(Late::BySteps), sought(Late::Besides));
+    let (by_steps, besides) = rayon::join(|| sought(Late::BySteps), || sought(Late::Besides));
     let evidence = by_steps.0.evidence(inquiry.twin);
     let there = Inquiry { evidence: &evidence, ..*inquiry };
     let later = gain(&there, &by_steps.1.selected, &besides.1.selected) > LATER;
@@ -137,7 +138,11 @@ impl<S: Clone + Send + Sync> Crossings<S> {
     ) -> (Self, Selection<T>) {
         let crossings = self.caught_up(inquiry, &selection.selected, late);
         let evidence = crossings.evidence(inquiry.twin);
-        let sought = selection.resumed(&Inquiry { evidence: &evidence, ..*inquiry }, progress);
+        // With steps of integration as long as they may be: what is found is fitted with the twin's own in the end.
+        let Hypothesis { twin, fit, .. } = &selection.selected;
+        let coarse = gates::exploring_step(twin, &fit.values, &evidence).map(|step| inquiry.twin.stepping(step));
+        let twin = coarse.as_ref().unwrap_or(inquiry.twin);
+        let sought = selection.resumed(&Inquiry { twin, evidence: &evidence, ..*inquiry }, progress);
         let crossings = crossings.caught_up(inquiry, &sought.selected, Late::BySteps);
         let evidence = crossings.evidence(inquiry.twin);
         let sought = sought.refitted(&Inquiry { evidence: &evidence, ..*inquiry });
