@@ -20,7 +20,7 @@ const UNBENT: f64 = 1.05;
 /// A twin that leaves a mean squared residual of at most this many times the noise lacks little.
 const NEARLY_ALL: f64 = 9.0;
 /// Most mechanisms in a set.
-const STAGES: usize = 4;
+const STAGES: usize = 3;
 /// What is selected is complete if it leaves a mean squared residual of at most this many times the noise.
 pub(super) const ABOVE_NOISE: f64 = 1.5;
 /// Hypotheses behind the best by no more than this, and no more than so many, are tried in their other forms.
