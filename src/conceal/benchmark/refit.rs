@@ -1,4 +1,5 @@
-//! An arm refitted in earnest, where it swings so far that what a small change of it does tells nothing of what a larger one would.
+//! An arm refitted in earnest: what a small change of it does tells little of what a larger one would, where gravity does not change in
+//! proportion.
 
 use std::f64::consts::PI;
 
@@ -21,8 +22,6 @@ const HALVINGS: usize = 7;
 /// A step that comes nearer by less than this part is the last.
 const LITTLE: f64 = 0.02;
 
-/// Angles [rad] between which gravity changes in proportion, or nearly so.
-const SMALL_ANGLE: f64 = 0.5;
 /// An arm that leaves less than this part of what small changes of it leave hides an effect.
 const HIDDEN: f64 = 0.5;
 
@@ -44,9 +43,8 @@ impl Refit<'_> {
             return false;
         }
         let (without, with) = (self.rows(UNCHANGED), Refit { effects: all, ..*self }.rows(UNCHANGED));
-        let apart = (&with - &without).amax();
         let left = || self.left(&with) < HIDDEN * hideable.size(with.as_slice(), without.as_slice(), 1.0);
-        apart > PI || apart > SMALL_ANGLE && left()
+        (&with - &without).amax() > PI || left()
     }
 
     /// Positions, row by row, after a relative change of all that is free.
