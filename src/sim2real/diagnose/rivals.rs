@@ -13,9 +13,8 @@ use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
 const SLIGHT: f64 = 0.02;
-/// Unless the evidence for it is more than this, and it explains as much where it was not fitted: of laws that explained so little more than
-/// a special case that was the right one, none came to more than 55 (33 cases of development seeds 70 and 71); of one that was right itself,
-/// the evidence was 1,465.
+/// Unless the evidence for it is more than this, and it explains as much where it was not fitted: of laws as slight as that beside a special
+/// case that was the right one none had any (32 cases of development seeds 70 and 71); one that was right itself had 1,465.
 const NOT_SLIGHT: f64 = 200.0;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
