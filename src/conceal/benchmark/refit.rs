@@ -150,5 +150,8 @@ mod tests {
         let to_and_fro = Drive { commands: to_and_fro.collect(), ..pushed(0.0) };
         let twice_as_heavy = Effect::Load { time: 4.0, inertia: 0.0, gravity: 1.0 };
         assert!(!hides(&to_and_fro, twice_as_heavy), "from then on, and no arm is so from the beginning");
+        let from_the_beginning = Effect::Load { time: -1.0, inertia: 0.0, gravity: 1.0 };
+        let gently = Drive { commands: to_and_fro.commands.iter().map(|torque| 0.25 * torque).collect(), ..to_and_fro };
+        assert!(hides(&gently, from_the_beginning), "another arm is so, however little it moves");
     }
 }
