@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::robot::Mover;
+use crate::robot::sine::sines;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `sine sin(counts q) + cosine cos(counts q)`; in the form `per_length`, of a linear axis, with `wave_number` for
@@ -67,36 +68,71 @@ impl<P: Mover> Mechanism<P> for Cogging {
     }
 
     fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let row = |k| thetas.row(k).to_vec();
-        let teeth = Teeth { sine: row(0), cosine: row(1), number: row(2) };
-        if form < 2 { Box::new(teeth) } else { Box::new(Harmonics { teeth, sine: row(3), cosine: row(4) }) }
+        let values = |lane: usize| -> Vec<f64> { (0..thetas.parameters()).map(|k| thetas.row(k)[lane]).collect() };
+        let lanes: Vec<Vec<f64>> = (0..thetas.lanes()).map(values).collect();
+        let teeth = Teeth(lanes.iter().map(|values| Wave::first(values)).collect());
+        if form < 2 {
+            return Box::new(teeth);
+        }
+        let halves = Teeth(lanes.iter().map(|values| Wave::second(values)).collect());
+        Box::new(Harmonics { teeth, halves })
     }
 }
 
+/// `sine sin(number q) + cosine cos(number q)` as one sine, which takes half the time of two.
+#[derive(Debug, Clone, Copy)]
+struct Wave {
+    amplitude: f64,
+    phase: f64,
+    number: f64,
+}
+
+impl Wave {
+    fn new(sine: f64, cosine: f64, number: f64) -> Self {
+        Self { amplitude: sine.hypot(cosine), phase: cosine.atan2(sine), number }
+    }
+
+    /// That of the teeth, of all parameters of a lane.
+    fn first(values: &[f64]) -> Self {
+        Self::new(values[0], values[1], values[2])
+    }
+
+    /// The one half as long.
+    fn second(values: &[f64]) -> Self {
+        Self::new(values[3], values[4], 2.0 * values[2])
+    }
+}
+
+/// Lanes whose sines are taken at once.
+const BLOCK: usize = 8;
+
+/// One wave a lane.
 #[derive(Clone)]
-struct Teeth {
-    sine: Vec<f64>,
-    cosine: Vec<f64>,
-    number: Vec<f64>,
+struct Teeth(Vec<Wave>);
+
+impl Teeth {
+    fn push<P: Mover>(&self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        let blocks = self.0.chunks(BLOCK).zip(scene.states.chunks(BLOCK)).zip(effects.chunks_mut(BLOCK));
+        for ((waves, states), effects) in blocks.filter(|((waves, _), _)| waves.iter().any(|w| w.amplitude > 0.0)) {
+            let mut sine = [0.0; BLOCK];
+            for ((angle, wave), state) in sine.iter_mut().zip(waves).zip(states) {
+                *angle = wave.number * P::motion(state).midway(tick.step) + wave.phase;
+            }
+            sines(&mut sine[..waves.len()]);
+            for ((effect, wave), sine) in effects.iter_mut().zip(waves).zip(sine).filter(|((_, w), _)| w.amplitude > 0.0) {
+                P::push(effect).effort += wave.amplitude * sine;
+            }
+        }
+    }
 }
 
 impl<P: Mover> Law<P> for Teeth {
     fn change(&mut self, change: &LaneChange<'_>) {
-        change.parameter(0, &mut self.sine);
-        change.parameter(1, &mut self.cosine);
-        change.parameter(2, &mut self.number);
+        change.derived(&mut self.0, Wave::first);
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        let parameters = self.sine.iter().zip(&self.cosine).zip(&self.number);
-        for ((effect, state), ((sine, cosine), number)) in effects.iter_mut().zip(scene.states).zip(parameters) {
-            if *sine == 0.0 && *cosine == 0.0 {
-                continue;
-            }
-            let motion = P::motion(state);
-            let (s, c) = (number * motion.midway(tick.step)).sin_cos();
-            P::push(effect).effort += sine * s + cosine * c;
-        }
+        self.push(tick, scene, effects);
     }
 }
 
@@ -104,28 +140,18 @@ impl<P: Mover> Law<P> for Teeth {
 #[derive(Clone)]
 struct Harmonics {
     teeth: Teeth,
-    sine: Vec<f64>,
-    cosine: Vec<f64>,
+    halves: Teeth,
 }
 
 impl<P: Mover> Law<P> for Harmonics {
     fn change(&mut self, change: &LaneChange<'_>) {
-        Law::<P>::change(&mut self.teeth, change);
-        change.parameter(3, &mut self.sine);
-        change.parameter(4, &mut self.cosine);
+        change.derived(&mut self.teeth.0, Wave::first);
+        change.derived(&mut self.halves.0, Wave::second);
     }
 
     fn act(&mut self, tick: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        self.teeth.act(tick, scene, effects);
-        let parameters = self.sine.iter().zip(&self.cosine).zip(&self.teeth.number);
-        for ((effect, state), ((sine, cosine), number)) in effects.iter_mut().zip(scene.states).zip(parameters) {
-            if *sine == 0.0 && *cosine == 0.0 {
-                continue;
-            }
-            let motion = P::motion(state);
-            let (s, c) = (2.0 * number * motion.midway(tick.step)).sin_cos();
-            P::push(effect).effort += sine * s + cosine * c;
-        }
+        self.teeth.push(tick, scene, effects);
+        self.halves.push(tick, scene, effects);
     }
 }
 

@@ -90,6 +90,7 @@ impl<P: Mover> Mechanism<P> for Compliance {
             hardening_twist: if hardens { thetas.row(3).to_vec() } else { vec![f64::INFINITY; thetas.lanes()] },
             motor_friction: form == MOTOR_FRICTION,
             second: vec![None; thetas.lanes()],
+            elastic: vec![Elastic::UNKNOWN; thetas.lanes()],
         };
         if matches!(form, 0 | 2) { Box::new(OnMotor(shaft)) } else { Box::new(OnLink(shaft)) }
     }
@@ -106,6 +107,38 @@ struct Shaft {
     /// Whether dry friction is that of the mass without an encoder.
     motor_friction: bool,
     second: Vec<Option<SecondMass>>,
+    /// What was last made of these.
+    elastic: Vec<Elastic>,
+}
+
+/// What of a lane's shaft stays as long as the inertia does: roots and quotients.
+#[derive(Debug, Clone, Copy)]
+struct Elastic {
+    /// Inertia of both masses [kg m^2].
+    whole: f64,
+    stiffness: f64,
+    /// Inertia with which both masses swing against each other [kg m^2].
+    reduced: f64,
+    damping: f64,
+}
+
+impl Elastic {
+    const UNKNOWN: Self = Self { whole: f64::NAN, stiffness: 0.0, reduced: 0.0, damping: 0.0 };
+
+    fn new(compliance: f64, share: f64, damping_ratio: f64, whole: f64) -> Self {
+        let (stiffness, reduced) = (1.0 / compliance, share * (1.0 - share) * whole);
+        Self { whole, stiffness, reduced, damping: 2.0 * damping_ratio * (stiffness * reduced).sqrt() }
+    }
+
+    /// What holds the masses together that are bent against each other by `bend` [rad] and, at `rate` [rad/s], ever more so, in a
+    /// step of `step` [s], by a spring that is `harder` by this share for it.
+    fn coupling(&self, bend: f64, rate: f64, harder: f64, step: f64) -> Coupling {
+        let tangent = self.stiffness * (1.0 + 3.0 * harder);
+        Coupling {
+            effort: self.stiffness * (1.0 + harder) * bend + self.damping * rate,
+            rate: 0.5 * self.damping + spring_inertia(tangent, self.reduced, step) / step,
+        }
+    }
 }
 
 /// What acts on the mass without an encoder, and what the plant takes to act on the one with it.
@@ -125,6 +158,7 @@ impl Shaft {
         change.parameter(2, &mut self.damping_ratio);
         change.derived(&mut self.hardening_twist, |values| values.get(3).copied().unwrap_or(f64::INFINITY));
         change.memory(&mut self.second);
+        self.elastic.fill(Elastic::UNKNOWN);
     }
 
     /// One step of all lanes; `sides` says for a lane and its state where the mass without an encoder is in the middle of
@@ -143,8 +177,10 @@ impl Shaft {
                 continue;
             }
             let (first, whole, share) = (P::motion(state), P::inertia(scene.dynamics, lane, state), self.share[lane]);
-            let reduced = share * (1.0 - share) * whole;
-            let stiffness = 1.0 / compliance;
+            if self.elastic[lane].whole != whole {
+                self.elastic[lane] = Elastic::new(compliance, share, self.damping_ratio[lane], whole);
+            }
+            let elastic = self.elastic[lane];
             let second = match &mut self.second[lane] {
                 Some(second) => {
                     if !self.motor_friction {
@@ -155,7 +191,7 @@ impl Shaft {
                 None => {
                     let efforts = at_rest(lane, state);
                     let together = twist(as_one(share, efforts.0, efforts.1) * compliance, self.hardening_twist[lane]);
-                    let swing = together * (stiffness / reduced).sqrt();
+                    let swing = together * (elastic.stiffness / elastic.reduced).sqrt();
                     let bent = if begins_bent(first.velocity, swing, efforts) { together } else { 0.0 };
                     self.second[lane].insert(SecondMass::starting(Motion { position: first.position - bent, ..first }))
                 }
@@ -164,13 +200,8 @@ impl Shaft {
             let midway = second.motion.position + half * second.motion.velocity;
             let rate = first.velocity - second.motion.velocity;
             let bend = first.position + half * first.velocity - midway;
-            let damping = 2.0 * self.damping_ratio[lane] * (stiffness * reduced).sqrt();
             let harder = (bend / self.hardening_twist[lane]).powi(2);
-            let tangent = stiffness * (1.0 + 3.0 * harder);
-            let coupling = Coupling {
-                effort: stiffness * (1.0 + harder) * bend + damping * rate,
-                rate: 0.5 * damping + spring_inertia(tangent, reduced, tick.step) / tick.step,
-            };
+            let coupling = elastic.coupling(bend, rate, harder, tick.step);
             let sides = sides(lane, state, midway);
             let push = P::push(effect);
             let dry_friction = if self.motor_friction { push.without_dry_friction() } else { 0.0 };

@@ -7,7 +7,8 @@
 use rayon::prelude::*;
 
 use super::excitation::{Excitation, family};
-use super::hypothesis::{Hypothesis, Inquiry};
+use super::gates;
+use super::hypothesis::{Hypothesis, Inquiry, STARTS};
 use super::noise::median;
 use super::rivals::Place;
 use super::select::Selection;
@@ -47,10 +48,15 @@ pub(super) fn next<T: Twin>(
     if !matches!(verdict, Verdict::Ambiguous | Verdict::NotExcited) || effects.is_empty() {
         return None;
     }
+    // With steps of integration as long as they may be: what tells hypotheses apart is far more than these are off by.
+    let Hypothesis { twin, fit, .. } = &selection.selected;
+    let coarse = gates::exploring_step(twin, &fit.values, inquiry.evidence).map(|step| inquiry.twin.stepping(step));
+    let inquiry = &Inquiry { twin: coarse.as_ref().unwrap_or(inquiry.twin), ..*inquiry };
+    let selected = inquiry.stepped(&selection.selected);
     let others = contenders(inquiry, selection, places);
     let own: Vec<&str> = effects.iter().map(|e| e.mechanism.as_str()).collect();
     let all: Vec<&str> = others.iter().map(|(name, _)| name.as_str()).collect();
-    let Some(best) = Design::of(inquiry, &selection.selected, &others).and_then(|design| design.best()) else {
+    let Some(best) = Design::of(inquiry, &selected, &others).and_then(|design| design.best()) else {
         let other = match messages {
             true => "send orders of other sizes and at other intervals, in a market that moves more and less",
             false => "record with other amplitudes and frequencies",
@@ -139,12 +145,12 @@ fn contenders<T: Twin>(
         }
     }
     if kept.is_empty() {
-        return selection.without.first().map(|less| (String::new(), less.clone())).into_iter().collect();
+        return selection.without.first().map(|less| (String::new(), inquiry.stepped(less))).into_iter().collect();
     }
     let fitted = kept.par_iter().filter_map(|(place, number)| {
-        let less = selection.without.get(*place)?;
+        let less = &inquiry.stepped(selection.without.get(*place)?);
         let screened = inquiry.screened(less).into_iter().find(|s| s.number == *number)?;
-        Some((name(*number).to_owned(), inquiry.extended(less, *number, &screened, Effort::Thorough)))
+        Some((name(*number).to_owned(), inquiry.extended(less, &screened, STARTS, Effort::Thorough)))
     });
     fitted.collect()
 }

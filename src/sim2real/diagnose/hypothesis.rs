@@ -83,8 +83,8 @@ const KEEPS_UP: f64 = 4.0;
 /// Bock, "Recent advances in parameter identification techniques for ODE", in *Numerical Treatment of Inverse Problems* (1983)).
 const WINDOWS: [f64; 2] = [24.0, 6.0];
 
-/// How many of a candidate's starts are followed.
-const STARTS: usize = 4;
+/// How many of a candidate's starts are followed at the most.
+pub(super) const STARTS: usize = 4;
 
 impl<T: Twin> Inquiry<'_, T> {
     /// The twin as given, its own parameters refitted: from where they are given and, where that does not follow, from where windows lead.
@@ -110,11 +110,11 @@ impl<T: Twin> Inquiry<'_, T> {
         })
     }
 
-    /// `parent` with candidate `number` added, fitted from the starts that screening liked best.
-    pub fn extended(&self, parent: &Hypothesis<T>, number: usize, screened: &Screened, effort: Effort) -> Hypothesis<T> {
-        let twin = parent.twin.with(&self.candidates[number]);
-        let starts = apart(&screened.starts, twin.parameters());
-        let added = parent.added.iter().copied().chain([number]).collect();
+    /// `parent` with what was `screened` added, fitted from `most` of the starts that screening liked best.
+    pub fn extended(&self, parent: &Hypothesis<T>, screened: &Screened, most: usize, effort: Effort) -> Hypothesis<T> {
+        let twin = parent.twin.with(&self.candidates[screened.number]);
+        let starts = apart(&screened.starts, twin.parameters(), most);
+        let added = parent.added.iter().copied().chain([screened.number]).collect();
         self.fitted(twin, added, &starts, Some(&parent.fit.state), effort)
     }
 
@@ -130,7 +130,7 @@ impl<T: Twin> Inquiry<'_, T> {
         effort: Effort,
     ) -> Hypothesis<T> {
         let twin = less.twin.with(&self.candidates[screened.number]);
-        let mut starts = apart(&screened.starts, twin.parameters());
+        let mut starts = apart(&screened.starts, twin.parameters(), STARTS);
         starts.extend(self.in_place(whole, less, screened));
         let added = less.added.iter().copied().chain([screened.number]).collect();
         self.fitted(twin, added, &starts, Some(&less.fit.state), effort)
@@ -221,6 +221,11 @@ impl<T: Twin> Inquiry<'_, T> {
         added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]))
     }
 
+    /// `hypothesis` with this inquiry's step of integration, and nothing of it fitted anew.
+    pub fn stepped(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
+        Hypothesis { twin: self.with(&hypothesis.added), ..hypothesis.clone() }
+    }
+
     /// `hypothesis` refitted with this inquiry's step of integration, from where it stands.
     pub fn refitted(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
         self.followed_on(hypothesis, Effort::Thorough)
@@ -253,8 +258,15 @@ impl<T: Twin> Inquiry<'_, T> {
         effort: Effort,
     ) -> Hypothesis<T> {
         let problem = self.problem(&twin, &self.evidence.compared);
-        let estimated = self.evidence.initial_state(&problem);
-        let best = fit(&problem, starts, &free_parameters(&twin), state.unwrap_or(&estimated), effort);
+        let estimated;
+        let state = match state {
+            Some(state) => state,
+            None => {
+                estimated = self.evidence.initial_state(&problem);
+                &estimated
+            }
+        };
+        let best = fit(&problem, starts, &free_parameters(&twin), state, effort);
         let blocks = problem.blocks();
         self.weighed(twin, added, best, &blocks)
     }
@@ -306,8 +318,8 @@ pub(super) fn free_parameters<T: Twin>(twin: &T) -> Vec<usize> {
     twin.parameters().iter().enumerate().filter(|(_, p)| !p.frozen()).map(|(k, _)| k).collect()
 }
 
-/// The first starts that differ from those before them by more than a fit makes up for in a step or two.
-fn apart(starts: &[Vec<f64>], parameters: &[Parameter]) -> Vec<Vec<f64>> {
+/// The first starts that differ from those before them by more than a fit makes up for in a step or two, `most` of them.
+fn apart(starts: &[Vec<f64>], parameters: &[Parameter], most: usize) -> Vec<Vec<f64>> {
     let mut kept: Vec<Vec<f64>> = Vec::new();
     for start in starts {
         let near = |other: &Vec<f64>| {
@@ -316,7 +328,7 @@ fn apart(starts: &[Vec<f64>], parameters: &[Parameter]) -> Vec<Vec<f64>> {
                 (a - b).abs() <= 0.3 * if size.is_finite() { size } else { b.abs() }
             })
         };
-        if kept.len() < STARTS && !kept.iter().any(near) {
+        if kept.len() < most && !kept.iter().any(near) {
             kept.push(start.clone());
         }
     }

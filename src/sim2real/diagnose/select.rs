@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::forms::reformed;
 use super::free_run::{steadiest_first, strays};
-use super::hypothesis::{Hypothesis, Inquiry};
+use super::hypothesis::{Hypothesis, Inquiry, STARTS};
 use super::needed::{needed, needed_share};
 use super::screen::Screened;
 use super::weigh::{gain, lead, pursued, ranked, squares};
@@ -48,6 +48,8 @@ const BROKEN_PROMISES: usize = 2;
 const ALL_BROKEN: usize = 8;
 /// Signatures with a cosine above this look alike: such rivals are fitted too.
 const ALIKE: f64 = 0.9;
+/// Starts that are followed of mechanisms that are fitted though as many as [`FITTED`] promise more.
+const UNPROMISING: usize = 2;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
 const ALWAYS_FITTED: usize = 3;
 /// Others are fitted if their signature, with this many times the evidence the parent's residuals hold, could gain
@@ -221,6 +223,15 @@ impl<T: Twin> Selection<T> {
     }
 }
 
+/// A candidate that may be fitted beside one of the beam.
+struct Job {
+    /// Its parent's place in the beam.
+    place: usize,
+    screened: Screened,
+    /// How many of its starts are followed; none where it is not fitted at first.
+    starts: usize,
+}
+
 /// All sets one larger than those of the beam, best first, and how each mechanism did beside the best of the beam.
 fn expand<T: Twin>(
     inquiry: &Inquiry<'_, T>,
@@ -228,32 +239,32 @@ fn expand<T: Twin>(
     beam: &[Hypothesis<T>],
     stage: usize,
 ) -> (Vec<Hypothesis<T>>, Vec<Score>) {
-    let mut jobs: Vec<(usize, Screened, bool)> = Vec::new();
+    let mut jobs: Vec<Job> = Vec::new();
     for (place, parent) in beam.iter().enumerate() {
         let mut screened = inquiry.screened(parent);
         screened.sort_by(|a, b| b.score.total_cmp(&a.score));
         let chosen = chosen(inquiry, first, parent, &screened, place);
-        jobs.extend(screened.into_iter().zip(chosen).map(|(one, chosen)| (place, one, chosen)));
+        jobs.extend(screened.into_iter().zip(chosen).map(|(screened, starts)| Job { place, screened, starts }));
     }
     once(beam, &mut jobs);
-    let fit = |jobs: &[(usize, Screened, bool)], wanted: &[bool]| -> Vec<Option<Hypothesis<T>>> {
-        let one = |((place, one, _), wanted): (&(usize, Screened, bool), &bool)| {
-            wanted.then(|| inquiry.extended(&beam[*place], one.number, one, Effort::Brief))
+    let fit = |starts: &[usize]| -> Vec<Option<Hypothesis<T>>> {
+        let one = |(Job { place, screened, .. }, starts): (&Job, &usize)| {
+            (*starts > 0).then(|| inquiry.extended(&beam[*place], screened, *starts, Effort::Brief))
         };
-        jobs.par_iter().zip(wanted).map(one).collect()
+        jobs.par_iter().zip(starts).map(one).collect()
     };
-    let first_round: Vec<bool> = jobs.iter().map(|(_, _, fitted)| *fitted).collect();
-    let mut brief = fit(&jobs, &first_round);
+    let first_round: Vec<usize> = jobs.iter().map(|job| job.starts).collect();
+    let mut brief = fit(&first_round);
     let further = further_forms(inquiry, &beam[0], &jobs, &brief);
-    for (one, other) in brief.iter_mut().zip(fit(&jobs, &further)) {
+    for (one, other) in brief.iter_mut().zip(fit(&further)) {
         *one = one.take().or(other);
     }
     let fitted = finished(inquiry, &beam[0], brief);
     let scores = jobs
         .iter()
         .zip(&fitted)
-        .filter(|((place, _, _), _)| *place == 0)
-        .map(|((_, screened, _), child)| {
+        .filter(|(job, _)| job.place == 0)
+        .map(|(Job { screened, .. }, child)| {
             let candidate = &inquiry.candidates[screened.number];
             Score {
                 mechanism: candidate.about.name.to_owned(),
@@ -272,34 +283,38 @@ fn expand<T: Twin>(
 
 /// Leaves of the chosen jobs one for each set, and beside those of the best parent as many as would leave least if the others
 /// did all that their signatures promise.
-fn once<T: Twin>(beam: &[Hypothesis<T>], jobs: &mut [(usize, Screened, bool)]) {
-    let left = |(place, one, _): &(usize, Screened, bool)| squares(&beam[*place]) * (1.0 - one.score * one.score);
-    let mut order: Vec<usize> = (0..jobs.len()).filter(|k| jobs[*k].2).collect();
-    order.sort_by(|a, b| (jobs[*a].0 > 0).cmp(&(jobs[*b].0 > 0)).then(left(&jobs[*a]).total_cmp(&left(&jobs[*b]))));
+fn once<T: Twin>(beam: &[Hypothesis<T>], jobs: &mut [Job]) {
+    let left = |job: &Job| squares(&beam[job.place]) * (1.0 - job.screened.score.powi(2));
+    let mut order: Vec<usize> = (0..jobs.len()).filter(|k| jobs[*k].starts > 0).collect();
+    order.sort_by(|a, b| {
+        let (a, b) = (&jobs[*a], &jobs[*b]);
+        (a.place > 0).cmp(&(b.place > 0)).then(left(a).total_cmp(&left(b)))
+    });
     let mut sets: Vec<Vec<usize>> = Vec::new();
     let mut beside = 0;
     for k in order {
-        let mut set = beam[jobs[k].0].set();
-        set.push(jobs[k].1.number);
+        let job = &mut jobs[k];
+        let mut set = beam[job.place].set();
+        set.push(job.screened.number);
         set.sort_unstable();
-        beside += usize::from(jobs[k].0 > 0);
+        beside += usize::from(job.place > 0);
         if sets.contains(&set) || beside > BESIDE {
-            jobs[k].2 = false;
+            job.starts = 0;
         }
         sets.push(set);
     }
 }
 
 /// The forms not fitted yet of those mechanisms that stand best beside the best parent, or fell short of what they promised; a wider law
-/// of the very best alone.
+/// of the very best alone. How many starts of each are followed.
 fn further_forms<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     parent: &Hypothesis<T>,
-    jobs: &[(usize, Screened, bool)],
+    jobs: &[Job],
     brief: &[Option<Hypothesis<T>>],
-) -> Vec<bool> {
+) -> Vec<usize> {
     let name = |number: usize| inquiry.candidates[number].about.name;
-    let own = jobs.iter().zip(brief).filter(|((place, _, _), _)| *place == 0);
+    let own = jobs.iter().zip(brief).filter(|(job, _)| job.place == 0);
     // What has one form alone takes the place of nothing that has others.
     let has_others = |added: &str| inquiry.candidates.iter().filter(|c| !c.general && c.about.name == added).count() > 1;
     let mut best: Vec<&str> = Vec::new();
@@ -310,12 +325,12 @@ fn further_forms<T: Twin>(
         }
     }
     let broken = broken_promises(inquiry, parent, jobs, brief);
-    let further = |(place, one, fitted): &(usize, Screened, bool)| {
+    let further = |Job { place, screened: one, starts }: &Job| {
         let known = match inquiry.candidates[one.number].general {
             true => best.first().is_some_and(|first| *first == name(one.number)),
             false => best.contains(&name(one.number)) || broken.iter().any(|number| name(*number) == name(one.number)),
         };
-        *place == 0 && !fitted && one.excited && known
+        if *place == 0 && *starts == 0 && one.excited && known { STARTS } else { 0 }
     };
     jobs.iter().map(further).collect()
 }
@@ -325,11 +340,11 @@ fn further_forms<T: Twin>(
 fn broken_promises<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     parent: &Hypothesis<T>,
-    jobs: &[(usize, Screened, bool)],
+    jobs: &[Job],
     brief: &[Option<Hypothesis<T>>],
 ) -> Vec<usize> {
-    let own = jobs.iter().zip(brief).filter(|((place, _, _), _)| *place == 0);
-    let promises = own.filter_map(|((_, one, _), child)| {
+    let own = jobs.iter().zip(brief).filter(|(job, _)| job.place == 0);
+    let promises = own.filter_map(|(Job { screened: one, .. }, child)| {
         let (promised, kept) = (one.score.max(0.0).powi(2), 1.0 - squares(child.as_ref()?) / squares(parent));
         (promised > PROMISED).then_some((promised, kept, one.number))
     });
@@ -360,7 +375,8 @@ fn finished<T: Twin>(
         .collect()
 }
 
-/// Which of the screened candidates, best first, are fitted, each mechanism in the form that screening likes best.
+/// Which of the screened candidates, best first, are fitted, each mechanism in the form that screening likes best, and from how many
+/// of their starts.
 ///
 /// Beside a twin with nothing added it is all that the recordings could show: the refit of a twin that lacks something may
 /// be bent so far that the signature of what it lacks looks like nothing at all. So may that of the best twin that lacks
@@ -371,7 +387,7 @@ fn chosen<T: Twin>(
     parent: &Hypothesis<T>,
     screened: &[Screened],
     place: usize,
-) -> Vec<bool> {
+) -> Vec<usize> {
     let effective: f64 = parent.misfits.iter().map(ChannelMisfit::effective).sum();
     // Residuals that are white hold all the evidence there is; others may hold more once more is explained.
     let whole: f64 = parent.misfits.iter().map(|m| m.count as f64).sum();
@@ -384,7 +400,6 @@ fn chosen<T: Twin>(
     };
     let near = parent.added.is_empty() || parent.within(NEARLY_ALL);
     let all = place == 0 && near && !parent.leaves_nothing() && !parent.unbent(UNBENT);
-    let most = FITTED;
     let mut mechanisms: Vec<&str> = Vec::new();
     screened
         .iter()
@@ -393,14 +408,19 @@ fn chosen<T: Twin>(
             let Candidate { about: About { name, .. }, general, .. } = &inquiry.candidates[one.number];
             let promising = all || one.score > 0.0 && (rank < always || hopeful(one.score));
             if *general || !one.excited || !promising || mechanisms.contains(name) {
-                return false;
+                return 0;
             }
             let alike = || one.signature.dot(&screened[0].signature).abs() > ALIKE;
-            let fitted = all || mechanisms.len() < most || alike() && mechanisms.len() < 2 * most;
-            if fitted {
+            let before = mechanisms.len();
+            let starts = match before < FITTED || before < 2 * FITTED && alike() {
+                true => STARTS,
+                false if all => UNPROMISING,
+                false => 0,
+            };
+            if starts > 0 {
                 mechanisms.push(name);
             }
-            fitted
+            starts
         })
         .collect()
 }

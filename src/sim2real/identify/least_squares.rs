@@ -177,9 +177,11 @@ struct Descent<'a, 'b, S: Simulator> {
     free: &'a [usize],
     theta: Vec<f64>,
     state: State,
-    /// What was followed at `theta` and `state`, and its normal equations.
+    /// What was followed at `theta` and `state`, and its normal equations; of where the last step led, once that is asked for.
     runs: Runs,
     normal: Normal,
+    /// What is left where the last step led, part by part, as long as derivatives there have not been asked for.
+    left: Option<Vec<Option<DVector<f64>>>>,
     /// Sum of squares there, priors of the parameters included.
     objective: f64,
     damping: f64,
@@ -197,11 +199,21 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         let state = state.clone();
         let runs = problem.followed(&theta, &state, free);
         let normal = Normal::new(&runs, &state);
-        let (objective, damping, fell, ended) = (0.0, DAMPING, 0.0, false);
-        let holds_back = false;
-        let mut descent = Self { problem, free, theta, state, runs, normal, objective, damping, holds_back, fell, ended };
+        let (left, objective, damping, fell) = (None, 0.0, DAMPING, 0.0);
+        let (holds_back, ended) = (false, false);
+        let mut descent =
+            Self { problem, free, theta, state, runs, normal, left, objective, damping, holds_back, fell, ended };
         descent.temper();
         descent
+    }
+
+    /// Follows the derivatives where the last step led. Of most starts nobody asks how they would go on.
+    fn settle(&mut self) {
+        if let Some(left) = self.left.take() {
+            self.runs = self.problem.followed_beside(left, &self.theta, &self.state, self.free);
+            self.normal = Normal::new(&self.runs, &self.state);
+            self.temper();
+        }
     }
 
     /// Holds the priors of initial states against the misfit as it is now.
@@ -229,6 +241,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
             if self.ended {
                 return;
             }
+            self.settle();
             let before = self.objective;
             self.step();
             // One small step may be the bend of a valley; two are its end.
@@ -271,6 +284,7 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
 
     /// One step: the best of several dampings, or none where more damping does not help either.
     fn step(&mut self) {
+        self.settle();
         let (information, gradient) = self.normal_equations();
         let held = self.held(&gradient);
         while self.damping < STUCK {
@@ -285,17 +299,14 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
                 .min_by(|a, b| a.1.total_cmp(&b.1));
             if let Some((k, value)) = best.filter(|(_, value)| *value < self.objective) {
                 let Some((theta, state)) = points.into_iter().nth(k) else { return };
-                // A step too small to matter needs no new derivatives.
                 self.fell = 1.0 - value / self.objective;
-                let matters = self.fell > 0.1 * CONVERGED;
+                // After a step too small to matter no other follows.
+                self.ended |= self.fell <= 0.1 * CONVERGED;
                 (self.theta, self.state) = (theta, state);
                 self.damping = (self.damping * SPREAD[k]).max(1e-9);
                 // What is left there has been followed already.
-                let known = residuals.into_iter().map(|part| part.into_iter().nth(k)).collect();
-                self.runs = self.problem.followed_beside(known, &self.theta, &self.state, self.free);
-                self.normal = Normal::new(&self.runs, &self.state);
-                self.temper();
-                self.ended |= !matters;
+                self.left = Some(residuals.into_iter().map(|part| part.into_iter().nth(k)).collect());
+                self.objective = value;
                 return;
             }
             self.damping *= SPREAD[2] * SPREAD[2];
@@ -353,7 +364,8 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
     }
 
     /// Residuals, derivatives and their consequences where the descent has come.
-    fn fit(self) -> Fit {
+    fn fit(mut self) -> Fit {
+        self.settle();
         let Self { problem, free, theta, state, runs, .. } = self;
         let evaluation = problem.projected(&runs, &state);
         let parameters = problem.simulator.parameters();
