@@ -46,9 +46,12 @@ const KEPT: f64 = 0.5;
 const BROKEN_PROMISES: usize = 2;
 /// The same where none kept what its signature promised.
 const ALL_BROKEN: usize = 8;
+/// Beside so many mechanisms and more, a signature has to promise something: what bent the twin is among them.
+const WITH_ALL: usize = 2;
 /// Signatures with a cosine above this look alike: such rivals are fitted too.
 const ALIKE: f64 = 0.9;
-/// Starts that are followed of mechanisms that are fitted though as many as [`FITTED`] promise more.
+/// Starts that are followed of mechanisms that are fitted though as many as [`FITTED`] promise more, and of all that are fitted beside
+/// others than the best.
 const UNPROMISING: usize = 2;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
 const ALWAYS_FITTED: usize = 3;
@@ -127,14 +130,18 @@ fn in_best_forms<T: Twin>(
     mut children: Vec<Hypothesis<T>>,
 ) -> Vec<Hypothesis<T>> {
     let Some(best) = children.first().cloned() else { return children };
+    // What gains too little to be kept is not bent by the form of another: of those it builds on that has been asked.
+    if gain(inquiry, parent, &best) <= ACCEPT {
+        return children;
+    }
     if best.leaves_nothing() && children.get(1).is_none_or(|other| lead(inquiry, parent, &best, other) > FORMS_MATTER) {
         return children;
     }
-    for child in children.iter_mut().take(REFORMED) {
+    children.par_iter_mut().take(REFORMED).for_each(|child| {
         if lead(inquiry, parent, &best, child) <= FORMS_MATTER {
             *child = reformed(inquiry, parent, child);
         }
-    }
+    });
     ranked(inquiry, parent, children)
 }
 
@@ -399,7 +406,7 @@ fn chosen<T: Twin>(
         -doubt * (1.0 - explained).max(1e-300).ln() > ACCEPT && benefit * explained > needed
     };
     let near = parent.added.is_empty() || parent.within(NEARLY_ALL);
-    let all = place == 0 && near && !parent.leaves_nothing() && !parent.unbent(UNBENT);
+    let all = place == 0 && parent.added.len() < WITH_ALL && near && !parent.leaves_nothing() && !parent.unbent(UNBENT);
     let mut mechanisms: Vec<&str> = Vec::new();
     screened
         .iter()
@@ -412,10 +419,11 @@ fn chosen<T: Twin>(
             }
             let alike = || one.signature.dot(&screened[0].signature).abs() > ALIKE;
             let before = mechanisms.len();
-            let starts = match before < FITTED || before < 2 * FITTED && alike() {
-                true => STARTS,
-                false if all => UNPROMISING,
-                false => 0,
+            let liked = before < FITTED || before < 2 * FITTED && alike();
+            let starts = match (liked, all) {
+                (true, _) if place == 0 => STARTS,
+                (true, _) | (_, true) => UNPROMISING,
+                (false, false) => 0,
             };
             if starts > 0 {
                 mechanisms.push(name);
