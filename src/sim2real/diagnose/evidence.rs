@@ -90,6 +90,12 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
         }
     }
 
+    /// What was held out, as if it were there to be fitted.
+    pub(super) fn of_held_out(&self) -> Self {
+        let held_out = || self.held_out.clone();
+        Self { free_run: held_out(), compared: held_out(), held_out: Vec::new(), ..self.in_free_run() }
+    }
+
     /// The same evidence, in which hypotheses are compared on windows that start afresh, into so many of which the longest part is cut.
     pub(super) fn in_windows(&self, count: f64) -> Self {
         let lasts = |part: &Part<'_, S>| {

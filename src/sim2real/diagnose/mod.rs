@@ -5,10 +5,11 @@
 //! by their signatures; `select` fits and compares sets of them, `weigh`ed by the evidence that `whiteness` counts, and `forms` finds
 //! for each the form that does best beside the others; `rivals` looks for other names, `carry_over` asks the one recording of
 //! what explains little in the other, and `confidence` says how sure one is;
-//! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out; the `decision`
-//! rests on all of it, and `verdict` and `words` tell it. `gates` says how long steps of integration may be, and `recognize` sees what needs no
-//! fit. `locate` and `onset` say where and since when the twin is off, `activity` when what was named acted, and `experiment`
-//! designs, from the commands of `excitation`, what to record where rivals are left; `unread` asks what the twin does not read of them. Where recordings show several things that no
+//! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out, and `constancy`
+//! asks whether the same constants hold there; the `decision` rests on all of it, and `verdict` and `words` tell it. `gates` says how
+//! long steps of integration may be, and `recognize` sees what needs no fit. `locate` and `onset` say where and since when the twin is
+//! off, `activity` when what was named acted, and `experiment` designs, from the commands of `excitation`, what to record where rivals
+//! are left; `unread` asks what the twin does not read of them. Where recordings show several things that no
 //! mechanism has in common, each of these `aspects` goes through all of it by itself.
 
 mod activity;
@@ -18,6 +19,7 @@ mod by_recording;
 mod carry_over;
 mod changes;
 mod confidence;
+mod constancy;
 mod crossings;
 mod decision;
 mod diagnosis;
@@ -309,9 +311,9 @@ fn as_stamped(
     let left_by = if of_no_law { &selection.recalibrated } else { &selection.selected };
     let depends = remainder::dependences(&inquiry, left_by, &covariates);
     let fits = prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed);
+    let std = uncertainty::inflated(&inquiry, &selection.selected, &trued);
     let refuted = decision::refuted(&inquiry, &selection, &fits, &covariates);
     let findings = decision::Findings {
-        fits,
         placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
         // Of what is refuted nothing was explained.
         remainder: if refuted || of_no_law { 1.0 } else { remainder::remainder(&inquiry, &selection, &depends) },
@@ -323,7 +325,9 @@ fn as_stamped(
         followed: remainder::followed(&trued, &selection.selected),
         dependence: remainder::strongest(&depends),
         foretold: remainder::foretold(&inquiry, &selection.selected),
-        std: uncertainty::inflated(&inquiry, &selection.selected, &trued),
+        changed: constancy::changed(&inquiry, &selection.selected, (&trued, &std), &fits),
+        fits,
+        std,
         trued: known.clone(),
         sampled: twin.clock() != Clock::Event,
         inexact: exact::inexact(&inquiry, &selection),

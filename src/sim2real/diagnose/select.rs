@@ -51,8 +51,10 @@ const WITH_ALL: usize = 2;
 /// Signatures with a cosine above this look alike: such rivals are fitted too.
 const ALIKE: f64 = 0.9;
 /// Starts that are followed of mechanisms that are fitted though as many as [`FITTED`] promise more, and of all that are fitted beside
-/// others than the best.
+/// others than the best; ...
 const UNPROMISING: usize = 2;
+/// ... unless they may begin at more places than this.
+const FEW_PLACES: usize = 8;
 /// Candidates that are fitted however little evidence the parent's residuals seem to hold.
 const ALWAYS_FITTED: usize = 3;
 /// Others are fitted if their signature, with this many times the evidence the parent's residuals hold, could gain
@@ -422,7 +424,7 @@ fn chosen<T: Twin>(
             let liked = before < FITTED || before < 2 * FITTED && alike();
             let starts = match (liked, all) {
                 (true, _) if place == 0 => STARTS,
-                (true, _) | (_, true) => UNPROMISING,
+                (true, _) | (_, true) => unpromising(&inquiry.candidates[one.number]),
                 (false, false) => 0,
             };
             if starts > 0 {
@@ -431,6 +433,13 @@ fn chosen<T: Twin>(
             starts
         })
         .collect()
+}
+
+/// How many starts are followed of a candidate that does not promise much: of the teeth of a motor, of which each number is a valley of
+/// its own, the first by a hair may be the wrong ones.
+fn unpromising(candidate: &Candidate) -> usize {
+    let places = candidate.form.parameters.iter().filter(|p| !p.linear).map(|p| p.starts.len().max(1));
+    if places.product::<usize>() > FEW_PLACES { STARTS } else { UNPROMISING }
 }
 
 /// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time. Gives the twin with
