@@ -54,14 +54,13 @@ pub(super) fn changed<T: Twin>(
     });
     let (_, place, k, values) = moved.max_by(|a, b| a.0.total_cmp(&b.0))?;
     let parameter = &selected.twin.parameters()[k];
-    let [here, elsewhere] = values.map(|value| words::figure(value, 3));
-    let name = inquiry.candidates[selected.added[place]].about.name;
     let unit = inquiry.twin.unit(&parameter.unit);
-    let said = format!(
-        "{name}.{} is {here} {unit} where it was fitted, and {elsewhere} {unit} would explain the rest",
+    let [here, elsewhere] = values.map(|value| format!("{} {unit}", words::figure(value, 3)).trim_end().to_owned());
+    let name = inquiry.candidates[selected.added[place]].about.name;
+    Some(format!(
+        "{name}.{} is {here} where it was fitted, and {elsewhere} would explain what it leaves elsewhere",
         parameter.name
-    );
-    Some(said.replace("  ", " ").replace(" ,", ","))
+    ))
 }
 
 /// The mean square that is left of held-out rows, in units of the noise.
