@@ -6,7 +6,7 @@
 //!
 //! Source: Chow, "Tests of equality between sets of coefficients in two linear regressions", Econometrica 28 (1960).
 
-use super::decision::ABOVE_THE_NOISE;
+use super::decision::{ABOVE_THE_NOISE, above_the_noise};
 use super::diagnosis::ChannelFit;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::{uncertainty, words};
@@ -31,7 +31,7 @@ pub(super) fn changed<T: Twin>(
     fits: &[ChannelFit],
 ) -> Option<String> {
     let asked = inquiry.twin.clock() != Clock::Event && inquiry.evidence.window.is_none() && !inquiry.evidence.sparse;
-    if !asked || selected.added.is_empty() || !fits.iter().any(|fit| left(fit) > ABOVE_THE_NOISE) {
+    if !asked || selected.added.is_empty() || !fits.iter().any(off) {
         return None;
     }
     let evidence = inquiry.evidence.of_held_out();
@@ -42,17 +42,16 @@ pub(super) fn changed<T: Twin>(
         return None;
     }
     let std_there = uncertainty::inflated(&there, &refitted, &refitted.fit);
-    let constants = (0..selected.added.len()).flat_map(|place| {
-        let lasting = inquiry.candidates[selected.added[place]].about.site != Site::Observation;
-        inquiry.of_mechanism(selected, place).filter(move |_| lasting).map(move |k| (place, k))
+    let lasting = |place: &usize| inquiry.candidates[selected.added[*place]].about.site != Site::Observation;
+    let moved = (0..selected.added.len()).filter(lasting).filter_map(|place| {
+        let parameters = selected.twin.parameters();
+        let constants = inquiry.of_mechanism(selected, place);
+        let constants = constants.filter(|k| parameters[*k].unit != "s" && parameters[*k].shown.is_none());
+        let asked = constants.map(|k| (k, Constant::of([fit.values[k], refitted.fit.values[k]], [std[k], std_there[k]])));
+        Some((place, most_moved(asked.collect())?))
     });
-    let moved = constants.filter_map(|(place, k)| {
-        let parameter = &selected.twin.parameters()[k];
-        let values = [fit.values[k], refitted.fit.values[k]];
-        let by = apart(values, [std[k], std_there[k]])?;
-        (parameter.unit != "s" && parameter.shown.is_none()).then_some((by, place, k, values))
-    });
-    let (_, place, k, values) = moved.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (place, (_, k)) = moved.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let values = [fit.values[k], refitted.fit.values[k]];
     let parameter = &selected.twin.parameters()[k];
     let unit = inquiry.twin.unit(&parameter.unit);
     let [here, elsewhere] = values.map(|value| format!("{} {unit}", words::figure(value, 3)).trim_end().to_owned());
@@ -63,6 +62,11 @@ pub(super) fn changed<T: Twin>(
     ))
 }
 
+/// Whether what was named leaves more than noise of held-out rows that the twin without it does not explain either.
+fn off(fit: &ChannelFit) -> bool {
+    left(fit) > ABOVE_THE_NOISE && above_the_noise(fit)
+}
+
 /// The mean square that is left of held-out rows, in units of the noise.
 fn left(fit: &ChannelFit) -> f64 {
     (fit.trued_rmse / fit.noise_floor).powi(2)
@@ -70,18 +74,47 @@ fn left(fit: &ChannelFit) -> f64 {
 
 /// Whether what was `refitted` to the held-out rows explains them where they were off.
 fn explains<T>(selected: &Hypothesis<T>, refitted: &Hypothesis<T>, fits: &[ChannelFit]) -> bool {
-    fits.iter().filter(|fit| left(fit) > ABOVE_THE_NOISE).all(|fit| {
+    fits.iter().filter(|fit| off(fit)).all(|fit| {
         let level = selected.misfits.iter().find(|m| m.channel == fit.channel).map_or(1.0, |m| m.level);
         let own = refitted.misfits.iter().find(|m| m.channel == fit.channel);
         own.is_some_and(|m| m.sum_of_squares / (level * m.count.max(1) as f64) - 1.0 < LEFT * (left(fit) - 1.0))
     })
 }
 
-/// By how many standard deviations of both two values of a constant differ, if they do.
-fn apart([here, there]: [f64; 2], std: [f64; 2]) -> Option<f64> {
-    let (by, scatter) = ((here - there).abs(), std[0].hypot(std[1]));
-    let differ = by > DIFFERENT * here.abs().max(there.abs()) && by > BEYOND_CHANCE * scatter && scatter > 0.0;
-    differ.then(|| by / scatter)
+/// What becomes of a constant where it was not fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Constant {
+    /// It is another, by so many standard deviations of both values.
+    Moves(f64),
+    /// It is known well enough to say that it is the same.
+    Stays,
+    /// It may be the same.
+    Open,
+}
+
+impl Constant {
+    fn of([here, there]: [f64; 2], std: [f64; 2]) -> Self {
+        let (by, scatter) = ((here - there).abs(), std[0].hypot(std[1]));
+        let different = DIFFERENT * here.abs().max(there.abs());
+        match by > different {
+            true if by > BEYOND_CHANCE * scatter && scatter > 0.0 => Self::Moves(by / scatter),
+            false if scatter > 0.0 && BEYOND_CHANCE * scatter < different => Self::Stays,
+            _ => Self::Open,
+        }
+    }
+}
+
+/// The constant of one law that moves most, and by how much; none where another of it stays: one of several may stand for what its form
+/// is off by, as the stiffness of what meets behind a gap.
+fn most_moved(constants: Vec<(usize, Constant)>) -> Option<(f64, usize)> {
+    if constants.iter().any(|(_, constant)| *constant == Constant::Stays) {
+        return None;
+    }
+    let moved = constants.into_iter().filter_map(|(k, constant)| match constant {
+        Constant::Moves(by) => Some((by, k)),
+        _ => None,
+    });
+    moved.max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 #[cfg(test)]
@@ -90,10 +123,19 @@ mod tests {
 
     #[test]
     fn constants_differ_by_a_quarter_and_beyond_chance() {
-        assert_eq!(apart([1.0, 0.5], [0.06, 0.08]), Some(5.0));
-        assert_eq!(apart([1.0, 0.8], [0.001, 0.001]), None, "the same law in another form");
-        assert_eq!(apart([1.0, 0.5], [0.3, 0.1]), None, "hardly known");
-        assert_eq!(apart([1.0, 0.5], [f64::INFINITY, 0.1]), None, "not known");
-        assert_eq!(apart([1.0, 0.5], [0.0, 0.0]), None, "not fitted");
+        assert_eq!(Constant::of([1.0, 0.5], [0.06, 0.08]), Constant::Moves(5.0));
+        assert_eq!(Constant::of([1.0, 0.8], [0.001, 0.001]), Constant::Stays, "the same law in another form");
+        assert_eq!(Constant::of([1.0, 0.9], [0.2, 0.001]), Constant::Open, "hardly known");
+        assert_eq!(Constant::of([1.0, 0.5], [0.3, 0.1]), Constant::Open, "hardly known, and another");
+        assert_eq!(Constant::of([1.0, 0.5], [f64::INFINITY, 0.1]), Constant::Open, "not known");
+        assert_eq!(Constant::of([1.0, 1.0], [0.0, 0.0]), Constant::Open, "not fitted");
+    }
+
+    #[test]
+    fn a_law_of_which_one_constant_stays_is_that_law() {
+        let [moves, more] = [Constant::Moves(3.0), Constant::Moves(7.0)];
+        assert_eq!(most_moved(vec![(4, moves), (5, Constant::Open), (6, more)]), Some((7.0, 6)));
+        assert_eq!(most_moved(vec![(4, moves), (5, Constant::Stays)]), None);
+        assert_eq!(most_moved(vec![(4, Constant::Open)]), None);
     }
 }

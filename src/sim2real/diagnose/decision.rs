@@ -136,7 +136,7 @@ fn fails_unseen(fit: &ChannelFit) -> bool {
 }
 
 /// Whether the recalibrated twin leaves more than the noise on held-out data.
-fn above_the_noise(fit: &ChannelFit) -> bool {
+pub(super) fn above_the_noise(fit: &ChannelFit) -> bool {
     fit.recalibrated_rmse * fit.recalibrated_rmse > HARDLY_ABOVE * fit.noise_floor * fit.noise_floor
 }
 
