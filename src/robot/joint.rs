@@ -3,7 +3,7 @@
 use super::estimate::{begun, initial_rate, motion, rounding, typical};
 use super::mover::{Motion, Mover, Push, rubbed};
 use super::signal::{Commands, Signal};
-use super::sine::{sine, sines};
+use super::sine::{BLOCK, sine, sines};
 use crate::sim2real::{
     Channel, Clock, Covariate, Dynamics, LaneChange, LaneDynamics, Observation, Parameter, Plant, Recording, Scene, Thetas,
     Tick, Typical,
@@ -246,9 +246,6 @@ struct Lane {
     gravity_torque: f64,
     gain: f64,
 }
-
-/// Lanes whose sines are taken at once.
-const BLOCK: usize = 8;
 
 impl Lane {
     /// One step of `step` [s]; `sine` is that of the position in the middle of it.

@@ -41,7 +41,7 @@ pub(super) fn sines(angles: &mut [f64]) {
 }
 
 /// Angles that take so many at once of the widest vectors there are.
-const BLOCK: usize = 8;
+pub(super) const BLOCK: usize = 8;
 
 /// Angles whose polynomials are to be put in their place.
 struct Polynomials<'a>(&'a mut [f64]);

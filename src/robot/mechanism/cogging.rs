@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::robot::Mover;
-use crate::robot::sine::sines;
+use crate::robot::sine::{BLOCK, sines};
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `sine sin(counts q) + cosine cos(counts q)`; in the form `per_length`, of a linear axis, with `wave_number` for
@@ -102,9 +102,6 @@ impl Wave {
         Self::new(values[3], values[4], 2.0 * values[2])
     }
 }
-
-/// Lanes whose sines are taken at once.
-const BLOCK: usize = 8;
 
 /// One wave a lane.
 #[derive(Clone)]
