@@ -67,6 +67,7 @@ trait Methods: Simulator<Stimulus = AnyStimulus> {
     fn any(&self) -> &dyn Any;
     fn candidates(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate>;
     fn of_the_record(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate>;
+    fn nameless(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate>;
     fn with(&self, candidate: &Candidate) -> AnyTwin;
     fn stepping(&self, seconds: f64) -> AnyTwin;
     fn quiet(&self) -> AnyTwin;
@@ -189,6 +190,10 @@ impl<T: Twin> Methods for Kind<T> {
 
     fn of_the_record(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
         self.0.of_the_record(&self.all(recordings))
+    }
+
+    fn nameless(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
+        self.0.nameless(&self.all(recordings))
     }
 
     fn with(&self, candidate: &Candidate) -> AnyTwin {
@@ -331,6 +336,10 @@ impl Twin for AnyTwin {
 
     fn of_the_record(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
         self.0.of_the_record(recordings)
+    }
+
+    fn nameless(&self, recordings: &[Recording<AnyStimulus>]) -> Vec<Candidate> {
+        self.0.nameless(recordings)
     }
 
     fn with(&self, candidate: &Candidate) -> Self {

@@ -387,11 +387,15 @@ fn bounds(form: &Form) -> Vec<[f64; 2]> {
 
 impl<P: Plant> Twin for Assembly<P> {
     fn candidates(&self, recordings: &[Recording<P::Stimulus>]) -> Vec<Candidate> {
-        self.unmodelled(recordings, |mechanism| !mechanism.of_the_record())
+        self.unmodelled(recordings, |mechanism| !mechanism.of_the_record() && !mechanism.nameless())
     }
 
     fn of_the_record(&self, recordings: &[Recording<P::Stimulus>]) -> Vec<Candidate> {
         self.unmodelled(recordings, |mechanism| mechanism.of_the_record())
+    }
+
+    fn nameless(&self, recordings: &[Recording<P::Stimulus>]) -> Vec<Candidate> {
+        self.unmodelled(recordings, |mechanism| mechanism.nameless())
     }
 
     fn with(&self, candidate: &Candidate) -> Self {

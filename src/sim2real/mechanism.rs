@@ -186,6 +186,11 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn of_the_record(&self) -> bool {
         false
     }
+    /// Whether it is a curve of any shape, which stands for no law: what is named has to explain more than it does, unless it
+    /// [contains](About::contains) that. It is never named.
+    fn nameless(&self) -> bool {
+        false
+    }
     /// The channel by which alone form `form` tells itself from a plainer one, so that recordings without it cannot tell of it.
     fn told_by(&self, _form: usize) -> Option<usize> {
         None

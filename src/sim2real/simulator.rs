@@ -144,6 +144,10 @@ pub trait Twin: Simulator + Clone + 'static {
     fn of_the_record(&self, _recordings: &[Recording<Self::Stimulus>]) -> Vec<Candidate> {
         Vec::new()
     }
+    /// The same of those that [stand for no law](super::Mechanism::nameless), which are no candidates either.
+    fn nameless(&self, _recordings: &[Recording<Self::Stimulus>]) -> Vec<Candidate> {
+        Vec::new()
+    }
     /// The twin with one more mechanism, whose parameters follow those it has.
     #[must_use]
     fn with(&self, candidate: &Candidate) -> Self;

@@ -246,6 +246,17 @@ const CASES: &[Case] = &[
         law: |_, x, u| plain(x, u, -0.08 * x[1].abs().powf(1.6) * x[1]),
         most: 2e-5,
     },
+    Case {
+        mechanism: "velocity_curve",
+        form: "",
+        values: &[-0.4, -0.05, 0.1, 0.2, 3.0],
+        law: |_, x, u| {
+            let [v, steep, flat] = [x[1], (0.4 - 0.05) / 2.0, (0.2 - 0.1) / 2.0];
+            let below = if v < -1.0 { -0.05 + steep * (v + 1.0) } else { 0.05 * v };
+            plain(x, u, -if v < 0.0 { below } else { 0.1 * v.min(1.0) + flat * (v - 1.0).max(0.0) })
+        },
+        most: 1e-4,
+    },
     Case { mechanism: "stiffness", form: "straight", values: &[1.5], law: |_, x, u| plain(x, u, -1.5 * x[0]), most: 2e-5 },
     Case {
         mechanism: "stiffness",

@@ -367,3 +367,9 @@ fn what_evidence_leaves_no_doubt_of_is_not_slight() {
 fn a_law_that_has_other_constants_elsewhere_is_not_what_is_missing() {
     assert_eq!(tried(75, 195).verdict, Verdict::Unexplained);
 }
+
+/// The same, of constants that are hardly others elsewhere: a curve of the velocity explains more than that gain does.
+#[test]
+fn what_a_curve_of_no_name_explains_better_is_not_what_is_missing() {
+    assert_eq!(tried(78, 153).verdict, Verdict::Unexplained);
+}

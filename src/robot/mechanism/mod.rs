@@ -19,6 +19,7 @@ mod stiffness;
 mod stribeck_friction;
 #[cfg(test)]
 mod trial;
+mod velocity_curve;
 
 pub use backlash::Backlash;
 pub use cogging::Cogging;
@@ -34,6 +35,7 @@ pub use payload_change::PayloadChange;
 pub use quadratic_drag::QuadraticDrag;
 pub use stiffness::Stiffness;
 pub use stribeck_friction::StribeckFriction;
+pub use velocity_curve::VelocityCurve;
 
 use super::{CartPole, Equations, Joint, Pendulum, Tanks};
 use crate::sim2real::Registry;
@@ -60,7 +62,7 @@ macro_rules! rows {
             signals, delays $delays, lags $lags, rates $rates,
             plant [
                 &Backlash, &ConstantLoad, &CoulombFriction, &StribeckFriction, &LoadFriction, &QuadraticDrag, &Stiffness,
-                &CubicStiffness, &Cogging, &PayloadChange, &EndStop, &Compliance, &Hysteresis
+                &CubicStiffness, &Cogging, &PayloadChange, &EndStop, &Compliance, &Hysteresis, &VelocityCurve
             ],
             sensor [
                 &Rectification { rate: rate_of_the_first($rates) }, &Eccentricity { rate: rate_of_the_first($rates) }

@@ -77,7 +77,7 @@ fn left<T: Twin>(
 }
 
 /// The mean square that is left at `values`, begun from where it is least.
-fn best_begun<T: Twin>(problem: &Problem<'_, T>, values: &[f64], mut state: State) -> f64 {
+pub(super) fn best_begun<T: Twin>(problem: &Problem<'_, T>, values: &[f64], mut state: State) -> f64 {
     let mut least = f64::INFINITY;
     for _ in 0..=SETTLED {
         let evaluation = problem.evaluate(values, &state, &[]);

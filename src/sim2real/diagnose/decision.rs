@@ -70,8 +70,8 @@ pub(super) struct Findings {
     pub beyond: bool,
     /// What the recordings say against what they are taken to have begun with, where nothing was named.
     pub contradiction: Option<String>,
-    /// Which constant of what was named is another where it was not fitted.
-    pub changed: Option<String>,
+    /// What says that a name is that of nothing that is there.
+    pub belied: Option<String>,
     /// Whether no more than a few of the held-out rows could tell of what was named.
     pub few_tell: bool,
     /// Whether what was named of messages is refuted by others, though something is missing.
@@ -191,7 +191,7 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
             false => unseen_there(&selection.selected, findings),
         };
     }
-    if findings.of_no_law || findings.changed.is_some() {
+    if findings.of_no_law || findings.belied.is_some() {
         return Verdict::Unexplained;
     }
     if !findings.fits.iter().any(|fit| confirms(fit, findings.sampled)) {
@@ -414,7 +414,7 @@ mod tests {
             inexact: false,
             beyond: false,
             contradiction: None,
-            changed: None,
+            belied: None,
             few_tell: false,
             refuted: false,
             of_no_law: false,

@@ -5,8 +5,8 @@
 //! by their signatures; `select` fits and compares sets of them, `weigh`ed by the evidence that `whiteness` counts, and `forms` finds
 //! for each the form that does best beside the others; `rivals` looks for other names, `carry_over` asks the one recording of
 //! what explains little in the other, and `confidence` says how sure one is;
-//! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out, and `constancy`
-//! asks whether the same constants hold there; the `decision` rests on all of it, and `verdict` and `words` tell it. `gates` says how
+//! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out, `constancy` asks
+//! whether the same constants hold there, and `nameless` whether a curve of any shape explains more; the `decision` rests on all of it, and `verdict` and `words` tell it. `gates` says how
 //! long steps of integration may be, and `recognize` sees what needs no fit. `locate` and `onset` say where and since when the twin is
 //! off, `activity` when what was named acted, and `experiment` designs, from the commands of `excitation`, what to record where rivals
 //! are left; `unread` asks what the twin does not read of them. Where recordings show several things that no
@@ -33,6 +33,7 @@ mod free_run;
 mod gates;
 mod hypothesis;
 mod locate;
+mod nameless;
 mod needed;
 mod no_law;
 mod noise;
@@ -325,7 +326,8 @@ fn as_stamped(
         followed: remainder::followed(&trued, &selection.selected),
         dependence: remainder::strongest(&depends),
         foretold: remainder::foretold(&inquiry, &selection.selected),
-        changed: constancy::changed(&inquiry, &selection.selected, (&trued, &std), &fits),
+        belied: constancy::changed(&inquiry, &selection.selected, (&trued, &std), &fits)
+            .or_else(|| nameless::beats(&inquiry, &selection, recordings, &fits)),
         fits,
         std,
         trued: known.clone(),

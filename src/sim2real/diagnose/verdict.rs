@@ -69,7 +69,7 @@ pub(super) fn facts<T: Twin>(inquiry: &Inquiry<'_, T>, findings: &Findings) -> w
         few: findings.trued.residual.len() < FEWEST_ROWS,
         remainder: findings.remainder,
         dependence: findings.dependence.clone(),
-        contradiction: findings.contradiction.clone().or_else(|| findings.changed.clone()),
+        contradiction: findings.contradiction.clone().or_else(|| findings.belied.clone()),
     }
 }
 

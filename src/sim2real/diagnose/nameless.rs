@@ -1,0 +1,65 @@
+//! Curves of no name: whether an effort that goes with the velocity in whatever way explains more than what was named.
+//!
+//! A law that acts on something else may go with the velocity for as long as one motion lasts, as the command of one side does with motion
+//! to that side. Where a curve in its place leaves less of what was fitted, and less by far of what was not, the effort goes with the
+//! velocity, and the name is that of nothing that is there. Laws that are such curves themselves have nothing to fear from one.
+//!
+//! Source: Armstrong-Hélouvry, Dupont & Canudas de Wit, "A survey of models, analysis tools and compensation methods for the control of
+//! machines with friction", Automatica 30 (1994): friction as a map of velocity that is found before a law is.
+
+use super::carry_over::best_begun;
+use super::diagnosis::ChannelFit;
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::select::Selection;
+use super::weigh;
+use crate::sim2real::any_twin::{AnyStimulus, AnyTwin};
+use crate::sim2real::identify::{Effort, State};
+use crate::sim2real::{Candidate, Clock, Recording, Simulator, Twin};
+
+/// What was named is asked where it leaves more than this many times the noise of held-out signals.
+const LEAVES: f64 = 1.05;
+/// Evidence above this [twice a log-likelihood] decides. Of the laws that were rightly named in 61 development cases of the blind
+/// benchmark, none loses by less than 12 to a curve.
+const DECISIVE: f64 = 10.0;
+/// A curve must leave at most this part of what is above the noise where neither was fitted.
+const LEFT: f64 = 0.5;
+
+/// What is to be said of the law that a curve beats, if one does.
+pub(super) fn beats(
+    inquiry: &Inquiry<'_, AnyTwin>,
+    selection: &Selection<AnyTwin>,
+    recordings: &[Recording<AnyStimulus>],
+    fits: &[ChannelFit],
+) -> Option<String> {
+    let off = |fit: &ChannelFit| fit.trued_rmse.powi(2) > LEAVES * fit.noise_floor.powi(2);
+    let asked = inquiry.twin.clock() != Clock::Event && inquiry.evidence.window.is_none() && !inquiry.evidence.sparse;
+    let selected = &selection.selected;
+    if !asked || selected.added.is_empty() || !fits.iter().any(off) {
+        return None;
+    }
+    let name = |place: usize| inquiry.candidates[selected.added[place]].about.name;
+    let left = left_elsewhere(inquiry, selected);
+    inquiry.twin.nameless(recordings).into_iter().find_map(|curve| {
+        let place = (0..selected.added.len()).find(|place| {
+            if curve.about.contains.contains(&name(*place)) {
+                return false;
+            }
+            let instead = instead(inquiry, &selection.without[*place], &curve);
+            weigh::gain(inquiry, selected, &instead) > DECISIVE
+                && left_elsewhere(inquiry, &instead) - 1.0 < LEFT * (left - 1.0)
+        })?;
+        Some(format!("{} in the place of {} explains more, here and elsewhere", curve.about.title, name(place)))
+    })
+}
+
+/// `less` with a curve, which is fitted from nothing on.
+fn instead(inquiry: &Inquiry<'_, AnyTwin>, less: &Hypothesis<AnyTwin>, curve: &Candidate) -> Hypothesis<AnyTwin> {
+    let values: Vec<f64> = less.fit.values.iter().copied().chain(curve.form.parameters.iter().map(|p| p.nominal)).collect();
+    inquiry.begun(less.twin.with(curve), less.added.clone(), &values, Some(&less.fit.state), Effort::Thorough)
+}
+
+/// The mean square that `hypothesis` leaves of what is held out, in units of the noise, begun from where it is least.
+fn left_elsewhere(inquiry: &Inquiry<'_, AnyTwin>, hypothesis: &Hypothesis<AnyTwin>) -> f64 {
+    let problem = inquiry.problem(&hypothesis.twin, &inquiry.evidence.held_out);
+    best_begun(&problem, &hypothesis.fit.values, State::estimated(&problem))
+}
