@@ -25,6 +25,7 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
             law: "inertia a = ... - torque(v), a line through five points",
             source: "Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), 2",
             remedy: "measure the effort that it takes to move at a constant velocity, in both directions",
+            // Of those that depend on load or on the past besides, most of what they do.
             contains: &["coulomb_friction", "stribeck_friction", "load_friction", "quadratic_drag", "hysteresis"],
         }
     }

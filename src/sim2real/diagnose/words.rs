@@ -20,7 +20,7 @@ pub(super) struct Facts {
     pub remainder: f64,
     /// What that depends on.
     pub dependence: Option<Dependence>,
-    /// What the recordings say against what they are taken to have begun with, or held-out ones against a constant that was fitted.
+    /// What the recordings say against what they are taken to have begun with, or held-out ones against what was named.
     pub contradiction: Option<String>,
 }
 
