@@ -132,8 +132,10 @@ fn in_best_forms<T: Twin>(
     mut children: Vec<Hypothesis<T>>,
 ) -> Vec<Hypothesis<T>> {
     let Some(best) = children.first().cloned() else { return children };
-    // What gains too little to be kept is not bent by the form of another: of those it builds on that has been asked.
-    if gain(inquiry, parent, &best) <= ACCEPT {
+    // What gains too little to be kept is not bent by the form of another, of those it builds on that has been asked; unless there are
+    // several that leave much, each of which was asked while the others stood in forms of their own.
+    let hide_others = parent.added.len() >= WITH_ALL && !parent.within(ABOVE_NOISE);
+    if !hide_others && gain(inquiry, parent, &best) <= ACCEPT {
         return children;
     }
     if best.leaves_nothing() && children.get(1).is_none_or(|other| lead(inquiry, parent, &best, other) > FORMS_MATTER) {
