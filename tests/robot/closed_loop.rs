@@ -176,7 +176,7 @@ fn dry_friction_is_named_in_a_closed_loop() {
 #[cfg(feature = "cli")]
 fn diagnosed_unpaced(every: usize, friction: f64) -> (serde_json::Value, String) {
     let folder = tempfile::TempDir::new().unwrap();
-    let goals = set_points(2_400);
+    let goals = set_points(1_200);
     let mut table = String::from("t,goal,q\n");
     let samples = sensed(reference(&goals, every, DerivativeOf::Measurement, friction));
     for ((time, goal), q) in goals.time.iter().zip(&goals.stimulus.0).zip(samples) {
