@@ -26,6 +26,8 @@ pub(super) const ABOVE_NOISE: f64 = 1.5;
 /// Hypotheses behind the best by no more than this, and no more than so many, are tried in their other forms.
 const FORMS_MATTER: f64 = 2.0 * ACCEPT;
 const REFORMED: usize = 3;
+/// So many mechanisms, if they leave more than [`ABOVE_NOISE`], may hide a further one by the forms they are in.
+const SEVERAL: usize = 2;
 /// Hypotheses that each stage hands to the next: the best alone may be the wrong one to build on.
 const BEAM: usize = 6;
 /// Mechanisms fitted from each hypothesis of the beam at the most, and from all others than the best together.
@@ -132,10 +134,10 @@ fn in_best_forms<T: Twin>(
     mut children: Vec<Hypothesis<T>>,
 ) -> Vec<Hypothesis<T>> {
     let Some(best) = children.first().cloned() else { return children };
-    // What gains too little to be kept is not bent by the form of another, of those it builds on that has been asked; unless there are
-    // several that leave much, each of which was asked while the others stood in forms of their own.
-    let hide_others = parent.added.len() >= WITH_ALL && !parent.within(ABOVE_NOISE);
-    if !hide_others && gain(inquiry, parent, &best) <= ACCEPT {
+    // What gains too little to be kept is not bent by the form of another: of those it builds on that has been asked. Of several, each
+    // was asked while the others stood in one form; where they leave much, all are asked together.
+    let asked = parent.added.len() < SEVERAL || parent.within(ABOVE_NOISE);
+    if asked && gain(inquiry, parent, &best) <= ACCEPT {
         return children;
     }
     if best.leaves_nothing() && children.get(1).is_none_or(|other| lead(inquiry, parent, &best, other) > FORMS_MATTER) {
