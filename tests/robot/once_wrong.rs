@@ -373,3 +373,29 @@ fn a_law_that_has_other_constants_elsewhere_is_not_what_is_missing() {
 fn what_a_curve_of_no_name_explains_better_is_not_what_is_missing() {
     assert_eq!(tried(78, 153).verdict, Verdict::Unexplained);
 }
+
+/// A friction that falls beside a large drift: plain friction leaves two hundredths of the noise more, which are no noise.
+#[test]
+fn what_leaves_noise_alone_is_not_passed_over_for_what_is_shorter() {
+    assert_eq!(names(&tried(78, 392)), ["drift", "stribeck_friction"]);
+}
+
+/// A gap whose teeth give, and a sensor wrong on one side, whose offset makes all that the gap leaves alike: by its evidence it stands
+/// last.
+#[test]
+fn what_leaves_least_is_built_on_though_its_residuals_are_all_alike() {
+    assert_eq!(names(&tried(79, 308)), ["backlash", "rectification"]);
+}
+
+/// Friction that gives before it slides, and a motor that grows warm: with friction in another form an elastic arm was worth a name, and
+/// what was left of it was not the best of two.
+#[test]
+fn what_three_explain_more_than_two_may_be_another_form_of_the_two() {
+    assert_eq!(names(&tried(78, 73)), ["stribeck_friction", "thermal_derating"]);
+}
+
+/// Friction that falls, seen beside a limit of rate only where it gives before it slides: its other forms do worse than plain friction.
+#[test]
+fn laws_that_contain_a_name_are_asked_in_all_their_forms() {
+    assert_eq!(names(&tried(79, 48)), ["rate_limit", "stribeck_friction"]);
+}

@@ -12,8 +12,8 @@ use super::gates;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::noise::median;
 use super::rivals::{self, Place};
-use super::select::{ACCEPT, Selection};
-use super::weigh::gain;
+use super::select::Selection;
+use super::weigh::{ACCEPT, gain};
 use super::{Evidence, Found, Progress};
 use crate::sim2real::{Measured, Recording, Twin};
 

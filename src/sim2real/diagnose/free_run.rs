@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::select::{ABOVE_NOISE, ACCEPT, Selection};
-use super::weigh::lead;
+use super::select::Selection;
+use super::weigh::{ABOVE_NOISE, ACCEPT, lead};
 use crate::sim2real::Twin;
 
 /// Of so many hypotheses that come near the best on windows, the one that does best in free run is taken.

@@ -41,6 +41,7 @@ mod onset;
 mod periodic;
 mod profile;
 mod prove;
+mod prune;
 mod recognize;
 mod record;
 mod remainder;

@@ -6,8 +6,9 @@
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::locate::{Covariates, identity};
-use super::select::{ACCEPT, Selection};
+use super::select::Selection;
 use super::structure::{about_groups, told_at_most};
+use super::weigh::ACCEPT;
 use crate::sim2real::Twin;
 use crate::sim2real::identify::Block;
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::gates;
 use super::hypothesis::{Hypothesis, Inquiry, free_parameters};
-use super::select::ACCEPT;
+use super::weigh::ACCEPT;
 use super::whiteness::autocorrelation_time;
 use crate::sim2real::identify::{Problem, State, fit_smooth};
 use crate::sim2real::{Clock, Part, Twin};

@@ -7,8 +7,8 @@ use super::Stretch;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::noise::fourth_difference;
 use super::rivals::Place;
-use super::select::{ACCEPT, Selection};
-use super::weigh::gain;
+use super::select::Selection;
+use super::weigh::{ACCEPT, gain};
 use crate::sim2real::{Candidate, Clock, Measured, Recording, Signs, Simulator, Twin};
 
 /// Rounding the simulated signal must leave at most this part of the squared residual.

@@ -169,7 +169,7 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
             };
             let simpler = selection.complete() && inquiry.at_a_bound(selected, place);
             let mut others = losses(likely(inquiry, selection, &screened, *own, simpler));
-            others.extend(losses(further_forms(inquiry, &screened, &others, *own)));
+            others.extend(losses(further_forms(inquiry, &screened, &others, *own, selected.leaves_nothing())));
             best_forms(inquiry, &mut others);
             let nearest = others.iter().map(|(_, loss)| *loss).filter(|loss| loss.is_finite()).min_by(f64::total_cmp);
             Place { gain: whole, nearest, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
@@ -215,18 +215,21 @@ fn likely<'s, T: Twin>(
 }
 
 /// The forms not tried yet of the rivals that come near, and of the special cases of candidate `own`: one of these is as good as that law
-/// where it is all that shows of it, and the form that screening likes best may lead nowhere.
+/// where it is all that shows of it, and the form that screening likes best may lead nowhere. The same of the laws that `own` is a special
+/// case of, unless that leaves nothing for them to explain.
 fn further_forms<'s, T: Twin>(
     inquiry: &Inquiry<'_, T>,
     screened: &'s [Screened],
     tried: &[(usize, f64)],
     own: usize,
+    leaves_nothing: bool,
 ) -> Vec<&'s Screened> {
     let name = |number: usize| inquiry.candidates[number].about.name;
     let near = |one: &Screened| tried.iter().any(|(other, loss)| *loss < NEAR && name(*other) == name(one.number));
-    let special = |one: &Screened| inquiry.candidates[own].about.contains.contains(&name(one.number));
+    let contains = |law: usize, other: usize| inquiry.candidates[law].about.contains.contains(&name(other));
+    let kin = |one: &Screened| contains(own, one.number) || !leaves_nothing && contains(one.number, own);
     let untried = |one: &Screened| !tried.iter().any(|(other, _)| *other == one.number);
-    screened.iter().filter(|one| (near(one) || special(one)) && untried(one)).collect()
+    screened.iter().filter(|one| (near(one) || kin(one)) && untried(one)).collect()
 }
 
 /// Leaves each mechanism in the form that loses least.

@@ -2,32 +2,24 @@
 
 use rayon::prelude::*;
 
-use super::forms::reformed;
+use super::forms::in_best_forms;
 use super::free_run::{steadiest_first, strays};
 use super::hypothesis::{Hypothesis, Inquiry, STARTS};
-use super::needed::{needed, needed_share};
+use super::needed::needed_share;
+use super::prune::pruned;
 use super::screen::Screened;
-use super::weigh::{gain, lead, pursued, ranked, squares};
+use super::weigh::{ABOVE_NOISE, ACCEPT, gain, lead, pursued, ranked, squares};
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
 use crate::sim2real::identify::Effort;
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
-/// A mechanism must gain more than this to be added.
-pub(super) const ACCEPT: f64 = 10.0;
 /// A twin that leaves a mean squared residual of at most this many times the noise is not bent by what it lacks.
 const UNBENT: f64 = 1.05;
 /// A twin that leaves a mean squared residual of at most this many times the noise lacks little.
 const NEARLY_ALL: f64 = 9.0;
 /// Most mechanisms in a set.
 const STAGES: usize = 3;
-/// What is selected is complete if it leaves a mean squared residual of at most this many times the noise.
-pub(super) const ABOVE_NOISE: f64 = 1.5;
-/// Hypotheses behind the best by no more than this, and no more than so many, are tried in their other forms.
-const FORMS_MATTER: f64 = 2.0 * ACCEPT;
-const REFORMED: usize = 3;
-/// So many mechanisms, if they leave more than [`ABOVE_NOISE`], may hide a further one by the forms they are in.
-const SEVERAL: usize = 2;
 /// Hypotheses that each stage hands to the next: the best alone may be the wrong one to build on.
 const BEAM: usize = 6;
 /// Mechanisms fitted from each hypothesis of the beam at the most, and from all others than the best together.
@@ -39,6 +31,8 @@ const FINISHED: usize = 5;
 const FAR_BEHIND: f64 = 0.5;
 /// ... unless it leaves no more than this many times as much: with residuals as correlated as theirs, gains say little.
 const AS_MUCH: f64 = 1.5;
+/// What leaves so many times less than all of the beam is in it, however little its gain.
+const BY_FAR: f64 = 2.0;
 /// Mechanisms of several forms of which all are fitted: those that stood best in the form that screening liked best.
 const IN_ALL_FORMS: usize = 3;
 /// So are those of mechanisms, and of so many at the most, whose signature promised to explain this part of the misfit and more, and
@@ -110,45 +104,40 @@ fn selected_from<T: Twin>(
         if !promising {
             break;
         }
-        // The best alone may be the wrong one to build on, unless it leaves nothing; what explains far less is not the right
-        // one either.
-        let best = children[0].clone();
-        let far = FAR_BEHIND * gain(inquiry, &beam[0], &best).max(0.0);
-        beam = children
-            .into_iter()
-            .take(if best.leaves_nothing() { 1 } else { BEAM })
-            .filter(|child| {
-                squares(child) <= AS_MUCH * squares(&best) || lead(inquiry, &recalibrated, &best, child) <= far.max(ACCEPT)
-            })
-            .collect();
+        beam = built_on(inquiry, &recalibrated, &beam[0], children);
     }
     let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
     Selection { recalibrated, selected, without, scores }
 }
 
-/// The hypotheses that come near the best, unless that leaves nothing, with each of their mechanisms in its best form; best
-/// first.
-fn in_best_forms<T: Twin>(
+/// Which of the `children` of the best of the last stage and of others, best first, are built on. The best alone may be the wrong one,
+/// unless it leaves nothing; what explains far less is not the right one either. What leaves least by far is, though its residuals may be
+/// so correlated that they count for nothing: an offset that is still missing makes them so.
+fn built_on<T: Twin>(
     inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
     parent: &Hypothesis<T>,
     mut children: Vec<Hypothesis<T>>,
 ) -> Vec<Hypothesis<T>> {
-    let Some(best) = children.first().cloned() else { return children };
-    // What gains too little to be kept is not bent by the form of another: of those it builds on that has been asked. Of several, each
-    // was asked while the others stood in one form; where they leave much, all are asked together.
-    let asked = parent.added.len() < SEVERAL || parent.within(ABOVE_NOISE);
-    if asked && gain(inquiry, parent, &best) <= ACCEPT {
-        return children;
+    let best = children[0].clone();
+    if best.leaves_nothing() {
+        return vec![best];
     }
-    if best.leaves_nothing() && children.get(1).is_none_or(|other| lead(inquiry, parent, &best, other) > FORMS_MATTER) {
-        return children;
+    if let Some(least) = least_by_far(&children) {
+        children.swap(BEAM - 1, least);
     }
-    children.par_iter_mut().take(REFORMED).for_each(|child| {
-        if lead(inquiry, parent, &best, child) <= FORMS_MATTER {
-            *child = reformed(inquiry, parent, child);
-        }
-    });
-    ranked(inquiry, parent, children)
+    children.truncate(BEAM);
+    let far = FAR_BEHIND * gain(inquiry, parent, &best).max(0.0);
+    children
+        .retain(|child| squares(child) <= AS_MUCH * squares(&best) || lead(inquiry, first, &best, child) <= far.max(ACCEPT));
+    children
+}
+
+/// The place of the one behind the beam that leaves less than any in it by far.
+fn least_by_far<T>(children: &[Hypothesis<T>]) -> Option<usize> {
+    let left: Vec<f64> = children.iter().map(squares).collect();
+    let least = (BEAM..left.len()).min_by(|a, b| left[*a].total_cmp(&left[*b]))?;
+    left[..BEAM].iter().all(|other| *other > BY_FAR * left[least]).then_some(least)
 }
 
 impl<T: Twin> Selection<T> {
@@ -446,50 +435,23 @@ fn unpromising(candidate: &Candidate) -> usize {
     if places.product::<usize>() > FEW_PLACES { STARTS } else { UNPROMISING }
 }
 
-/// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time. Gives the twin with
-/// nothing added too: its refit may have been better begun from where that of the set ended.
-fn pruned<T: Twin>(
-    inquiry: &Inquiry<'_, T>,
-    recalibrated: &Hypothesis<T>,
-    mut best_of_stage: Vec<Hypothesis<T>>,
-) -> (Hypothesis<T>, Hypothesis<T>, Vec<Hypothesis<T>>) {
-    let mut bare = recalibrated.clone();
-    let Some(mut whole) = best_of_stage.pop() else { return (bare.clone(), bare, Vec::new()) };
-    loop {
-        if whole.added.is_empty() {
-            return (bare.clone(), bare, Vec::new());
-        }
-        // A set must be worth its size beside the best of one less, whether or not that is a part of it.
-        if let Some(smaller) = best_of_stage.pop_if(|smaller| {
-            smaller.added.len() + 1 == whole.added.len()
-                && (gain(inquiry, smaller, &whole) <= ACCEPT || !needed(inquiry, &bare, smaller, &whole))
-        }) {
-            whole = smaller;
-            continue;
-        }
-        let mut without: Vec<Hypothesis<T>> =
-            (0..whole.added.len()).into_par_iter().map(|i| inquiry.without(&whole, i)).collect();
-        // Of three, one may stand for what two leave in the wrong form.
-        if whole.added.len() > 2 {
-            without = without.par_iter().map(|less| reformed(inquiry, recalibrated, less)).collect();
-        }
-        if let [alone] = without.as_mut_slice() {
-            if squares(alone) < squares(&bare) {
-                bare = alone.clone();
-            } else {
-                *alone = bare.clone();
-            }
-        }
-        let weakest = (0..whole.added.len())
-            .map(|i| (i, gain(inquiry, &without[i], &whole), needed(inquiry, &bare, &without[i], &whole)))
-            .filter(|(_, gain, needed)| *gain <= ACCEPT || !needed)
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((weakest, _, _)) = weakest else { return (bare, whole, without) };
-        let smaller = without[weakest].clone();
-        // Another set of that size, found on the way up, may have been the better one to keep.
-        whole = match best_of_stage.pop() {
-            Some(other) if lead(inquiry, &bare, &other, &smaller) > 0.0 => other,
-            _ => smaller,
+#[cfg(test)]
+mod tests {
+    use super::super::weigh::tests::leaving;
+    use super::*;
+
+    #[test]
+    fn what_leaves_least_by_far_is_built_on_however_late_it_stands() {
+        let children = |last: f64| {
+            let mut children = vec![leaving(15.0, 40.0); BEAM + 2];
+            children.push(leaving(last, 2.0));
+            children
         };
+        assert_eq!(least_by_far(&children(3.6)), Some(BEAM + 2));
+        assert_eq!(least_by_far(&children(8.0)), None, "less, and not by far");
+        assert_eq!(least_by_far(&children(3.6)[BEAM..]), None, "all are in the beam");
+        let mut known = children(3.6);
+        known[1] = leaving(4.0, 30.0);
+        assert_eq!(least_by_far(&known), None, "one that leaves as little is in the beam");
     }
 }

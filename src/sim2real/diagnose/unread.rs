@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use super::hypothesis::{Hypothesis, Inquiry, free_parameters};
 use super::locate::{Covariates, identity, quantile_bins, sorted};
 use super::onset::{Row, parted};
-use super::select::ACCEPT;
+use super::weigh::ACCEPT;
 use super::{ColumnSplit, gates};
 use crate::sim2real::identify::{Problem, State, fit_smooth};
 use crate::sim2real::{Clock, Twin};

@@ -9,6 +9,10 @@ use super::whiteness::ChannelMisfit;
 use crate::sim2real::identify::Effort;
 use crate::sim2real::{Clock, Parameter, Twin};
 
+/// A mechanism must gain more than this to be added.
+pub(super) const ACCEPT: f64 = 10.0;
+/// What is selected is complete if it leaves a mean squared residual of at most this many times the noise.
+pub(super) const ABOVE_NOISE: f64 = 1.5;
 /// What stands behind by more than this after a few steps is not followed further, ...
 const HOPELESS: f64 = 300.0;
 /// ... unless a few steps more leave it behind by no more than this part of that.
@@ -53,8 +57,9 @@ pub(super) fn ranked<T: Twin>(
     keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut order: Vec<Hypothesis<T>> = keyed.into_iter().map(|(_, h)| h).collect();
     if let Some(best) = order.first() {
-        let simplest =
-            (1..order.len()).filter(|k| alike(inquiry, reference, best, &order[*k])).min_by_key(|k| order[*k].free());
+        let simplest = (1..order.len())
+            .filter(|k| alike(inquiry.twin.clock(), reference, best, &order[*k]))
+            .min_by_key(|k| order[*k].free());
         if let Some(k) = simplest.filter(|k| order[*k].free() < best.free()) {
             order[..=k].rotate_right(1);
         }
@@ -63,24 +68,30 @@ pub(super) fn ranked<T: Twin>(
 }
 
 /// Whether two alternatives to `first` leave the same but for what steps of integration and forms of laws are off by: less than
-/// the noise by far, and next to nothing of what either explains. Of messages laws have the form they are written in.
-fn alike<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> bool {
-    if inquiry.twin.clock() == Clock::Event {
+/// the noise by far, and next to nothing of what either explains. Of messages laws have the form they are written in; and where one
+/// leaves noise and nothing else, and the other what is less white, the form of that one is off by nothing.
+fn alike<T>(clock: Clock, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> bool {
+    let [best, other] = if squares(a) <= squares(b) { [a, b] } else { [b, a] };
+    if clock == Clock::Event || best.leaves_nothing() && !as_white(other, best) {
         return false;
     }
     let noise: f64 = a.misfits.iter().zip(&b.misfits).map(|(a, b)| a.level.min(b.level) * a.count as f64).sum();
-    let apart = (squares(a) - squares(b)).abs();
-    apart <= TOLERATED * noise && apart <= NEXT_TO_NOTHING * (squares(first) - squares(a).min(squares(b)))
+    let apart = squares(other) - squares(best);
+    apart <= TOLERATED * noise && apart <= NEXT_TO_NOTHING * (squares(first) - squares(best))
 }
 
 /// By whose number of effective residuals `one` is weighed beside `best`, which leaves least: its own only where it is less white. What
 /// leaves more does not hold more evidence for being whiter, and were it otherwise, of three each might be preferred to the next.
 fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypothesis<T> {
+    if as_white(one, best) || squares(one) <= (1.0 + ALIKE_LEFT) * squares(best) { best } else { one }
+}
+
+/// Whether what `one` leaves is as white as what `best` leaves, as far as the scatter of that tells.
+fn as_white<T>(one: &Hypothesis<T>, best: &Hypothesis<T>) -> bool {
     let effective = |h: &Hypothesis<T>| h.misfits.iter().map(ChannelMisfit::effective).sum::<f64>().max(1e-300);
     let (own, of_best) = (effective(one), effective(best));
     let scatter = AS_WHITE.max(1.0 + SCATTER / own.min(of_best).sqrt());
-    let as_white = own * scatter > of_best;
-    if as_white || squares(one) <= (1.0 + ALIKE_LEFT) * squares(best) { best } else { one }
+    own * scatter > of_best
 }
 
 /// By how much the evidence prefers `a` to `b`, two alternatives to `first` of which neither need contain the other: what the
@@ -88,7 +99,7 @@ fn scale_of<'a, T>(one: &'a Hypothesis<T>, best: &'a Hypothesis<T>) -> &'a Hypot
 pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> f64 {
     let by_own = beforehand(inquiry, a) - beforehand(inquiry, b);
     let evidence = evidence(inquiry, first, a, b);
-    if !alike(inquiry, first, a, b) {
+    if !alike(inquiry.twin.clock(), first, a, b) {
         return evidence + by_own;
     }
     // What says the same is told apart by its length, and by whether it lets what rested begin at rest.
@@ -267,5 +278,21 @@ pub(super) mod tests {
         let mut coloured = leaving(9.0, 600.0);
         coloured.misfits[0].level = 9.0;
         assert!(!coloured.leaves_something(), "noise that remembers itself");
+    }
+    #[test]
+    fn what_leaves_noise_alone_is_not_like_what_leaves_as_little_and_less_white() {
+        let sampled = Clock::Sampled { longest_step: 0.01 };
+        let first = leaving(50.0, 30.0);
+        let like = |a: &Hypothesis<()>, b: &Hypothesis<()>| {
+            let both = [alike(sampled, &first, a, b), alike(sampled, &first, b, a)];
+            assert_eq!(both[0], both[1], "whichever comes first");
+            both[0]
+        };
+        let right = leaving(1.008, 6_000.0);
+        assert!(like(&right, &leaving(1.025, 5_500.0)), "as white: a form may be off by that");
+        assert!(!like(&right, &leaving(1.025, 1_000.0)), "something is in it");
+        assert!(like(&leaving(1.15, 1_200.0), &leaving(1.17, 600.0)), "in both something is");
+        assert!(!like(&right, &leaving(1.06, 5_500.0)), "more than a form is off by");
+        assert!(!alike(Clock::Event, &first, &right, &right), "messages have the forms laws are written in");
     }
 }
