@@ -61,9 +61,9 @@ const OFF_BY: f64 = 5e-4;
 
 /// Of three, one that is less likely than this to be right, or to have the right one among its rivals, stands for what the forms of the
 /// others are off by.
-const LIKELY: f64 = 0.6;
+const LIKELY: f64 = 0.65;
 /// The same of a special case beside the law that contains it.
-const LIKELY_BESIDE_ITS_LAW: f64 = 0.8;
+const LIKELY_BESIDE_ITS_LAW: f64 = 0.93;
 
 /// Puts rivals that do better in the place of what was selected, until none does; leaves out what might as well be
 /// anything; then lists the rivals that remain.
