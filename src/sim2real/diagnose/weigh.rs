@@ -24,6 +24,8 @@ const NEXT_TO_NOTHING: f64 = 0.01;
 /// The evidence between two that say the same in as many constants is no more than this: of 45 names of five spent test seeds that were
 /// told apart by no more, 37 were right, and twice the logarithm of such odds is 3.
 const INDIFFERENT: f64 = 3.0;
+/// Where of two that leave as little one is whiter, the evidence between them counts no more than this: the other is not excluded.
+const WHITER: f64 = 8.0;
 /// Laws that are met less often by themselves are held to be so many times less likely, as twice the logarithm: e to one.
 const SELDOM: f64 = 2.0;
 /// How a recording begins counts no more than this, twice the logarithm of twenty: laws of what is elastic or loose hold least in the
@@ -72,12 +74,16 @@ pub(super) fn ranked<T: Twin>(
 /// leaves noise and nothing else, and the other what is less white, the form of that one is off by nothing.
 fn alike<T>(clock: Clock, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> bool {
     let [best, other] = if squares(a) <= squares(b) { [a, b] } else { [b, a] };
-    if clock == Clock::Event || best.leaves_nothing() && !as_white(other, best) {
-        return false;
-    }
+    nearly_alike(clock, first, a, b) && !(best.leaves_nothing() && !as_white(other, best))
+}
+
+/// The same by what they leave alone, of whatever colour.
+fn nearly_alike<T>(clock: Clock, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> bool {
     let noise: f64 = a.misfits.iter().zip(&b.misfits).map(|(a, b)| a.level.min(b.level) * a.count as f64).sum();
-    let apart = squares(other) - squares(best);
-    apart <= TOLERATED * noise && apart <= NEXT_TO_NOTHING * (squares(first) - squares(best))
+    let apart = (squares(a) - squares(b)).abs();
+    clock != Clock::Event
+        && apart <= TOLERATED * noise
+        && apart <= NEXT_TO_NOTHING * (squares(first) - squares(a).min(squares(b)))
 }
 
 /// By whose number of effective residuals `one` is weighed beside `best`, which leaves least: its own only where it is less white. What
@@ -100,7 +106,9 @@ pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: 
     let by_own = beforehand(inquiry, a) - beforehand(inquiry, b);
     let evidence = evidence(inquiry, first, a, b);
     if !alike(inquiry.twin.clock(), first, a, b) {
-        return evidence + by_own;
+        // Of as many constants, the one that leaves noise alone is preferred; the form of a third may have bent the other.
+        let as_long = a.free() == b.free() && nearly_alike(inquiry.twin.clock(), first, a, b);
+        return if as_long { evidence.clamp(-WHITER, WHITER) } else { evidence } + by_own;
     }
     // What says the same is told apart by its length, and by whether it lets what rested begin at rest.
     let said = match b.free() as f64 - a.free() as f64 {
