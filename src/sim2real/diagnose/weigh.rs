@@ -74,7 +74,7 @@ pub(super) fn ranked<T: Twin>(
 /// leaves noise and nothing else, and the other what is less white, the form of that one is off by nothing.
 fn alike<T>(clock: Clock, first: &Hypothesis<T>, a: &Hypothesis<T>, b: &Hypothesis<T>) -> bool {
     let [best, other] = if squares(a) <= squares(b) { [a, b] } else { [b, a] };
-    nearly_alike(clock, first, a, b) && !(best.leaves_nothing() && !as_white(other, best))
+    nearly_alike(clock, first, a, b) && (!best.leaves_nothing() || as_white(other, best))
 }
 
 /// The same by what they leave alone, of whatever colour.
