@@ -287,6 +287,7 @@ pub(super) mod tests {
         coloured.misfits[0].level = 9.0;
         assert!(!coloured.leaves_something(), "noise that remembers itself");
     }
+
     #[test]
     fn what_leaves_noise_alone_is_not_like_what_leaves_as_little_and_less_white() {
         let sampled = Clock::Sampled { longest_step: 0.01 };
