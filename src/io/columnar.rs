@@ -159,7 +159,9 @@ fn load(mut file: File, container: Container, only: Option<&[String]>) -> Polars
             for group in 0..footer.row_groups.len() {
                 check_group(&footer, group, &columns, &mut again, size)?;
             }
-            Ok(ColumnarFile::of(reader.with_columns(Some(columns.wanted.clone())).finish()?, &columns))
+            let frame = reader.with_columns(Some(columns.wanted.clone())).finish()?;
+            check_lengths(&frame, footer.num_rows)?;
+            Ok(ColumnarFile::of(frame, &columns))
         }
         Container::Arrow => {
             let mut bytes = Vec::new();
@@ -176,7 +178,16 @@ pub(super) fn arrow_frame(bytes: Vec<u8>, agrees: impl Fn(&[u8]) -> bool) -> Pol
     let mut reader = IpcReader::new(Cursor::new(Arc::clone(&bytes)));
     let columns = Columns::of(&*reader.schema()?);
     polars_ensure!(agrees(&bytes), ComputeError: "its buffers contradict its size");
-    Ok((reader.with_columns(Some(columns.wanted.clone())).finish()?, columns))
+    let frame = reader.with_columns(Some(columns.wanted.clone())).finish()?;
+    check_lengths(&frame, frame.height())?;
+    Ok((frame, columns))
+}
+
+/// Holds every column of what was decoded to have `rows`: where levels run out before values the decoder gives as many as there are.
+pub(super) fn check_lengths(frame: &DataFrame, rows: usize) -> PolarsResult<()> {
+    let whole = frame.materialized_column_iter().all(|column| column.len() == rows);
+    polars_ensure!(whole, ComputeError: "its columns have fewer values than it has rows");
+    Ok(())
 }
 
 /// Holds the lists of a Parquet footer to its length, where there is one: it stands before its length and `PAR1`.

@@ -11,7 +11,7 @@ use polars::prelude::{
 
 use super::arrow_buffers::{Block, blocks, part, part_agrees};
 use super::columnar::{
-    ColumnarFile, Columns, Container, arrow_frame, caught, check_footer, check_group, check_rows, no_rows,
+    ColumnarFile, Columns, Container, arrow_frame, caught, check_footer, check_group, check_lengths, check_rows, no_rows,
 };
 use super::error::InputError;
 
@@ -130,6 +130,7 @@ impl RowGroups {
             .with_slice(Some((self.within, count)))
             .finish()?;
         polars_ensure!(frame.height() == count, ComputeError: "its row counts contradict each other");
+        check_lengths(&frame, count)?;
         self.within += count;
         Ok(Some(frame))
     }

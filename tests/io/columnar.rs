@@ -6,7 +6,7 @@ use std::fs::File;
 use std::path::Path;
 
 use polars::prelude::*;
-use trueup::io::{Table, TimeFormat, TimeUnit};
+use trueup::io::{Renames, Table, TableChunks, TimeFormat, TimeUnit};
 
 const NEW_YORK: TimeFormat = TimeFormat { unit: TimeUnit::Seconds, zone: chrono_tz::Tz::America__New_York };
 
@@ -120,6 +120,20 @@ fn a_parquet_footer_with_a_list_beyond_its_end_is_refused() {
     std::fs::write(&path, include_bytes!("../../fuzz/seeds/parquet/long_list")).unwrap();
     let message = Table::read(&path).unwrap_err().message;
     assert!(message.contains("the lists of its footer contradict its length"), "{message}");
+}
+
+/// A byte of its levels says that there are fewer values than its footer and its page header do: the decoder gave a column that was
+/// shorter than the others. By pieces it is refused too.
+#[test]
+fn a_parquet_column_with_fewer_values_than_rows_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    std::fs::write(&path, include_bytes!("../../fuzz/seeds/parquet/short_column")).unwrap();
+    let whole = Table::read(&path).unwrap_err();
+    let piecewise = TableChunks::open(&path, &Renames::default(), 2).unwrap_err();
+    for error in [whole, piecewise] {
+        assert!(error.message.contains("its columns have fewer values than it has rows"), "{error}");
+    }
 }
 
 /// Every table below `folder`.
