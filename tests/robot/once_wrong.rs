@@ -399,3 +399,24 @@ fn what_three_explain_more_than_two_may_be_another_form_of_the_two() {
 fn laws_that_contain_a_name_are_asked_in_all_their_forms() {
     assert_eq!(names(&tried(79, 48)), ["rate_limit", "stribeck_friction"]);
 }
+
+/// An end stop that fits closely, and a command with a limit: from where screening has that begin the fit went astray, and a drag was
+/// named for it.
+#[test]
+fn what_went_astray_begins_once_more_from_next_to_nothing() {
+    assert_eq!(names(&tried(1025, 266)), ["end_stop", "saturation"]);
+}
+
+/// A command that cannot follow and a sensor that drifts: without the drift what is left is all alike, and counts as nothing however
+/// little it is.
+#[test]
+fn what_leaves_far_less_is_gone_on_from_though_it_gains_nothing() {
+    assert_eq!(names(&tried(1025, 166)), ["drift", "rate_limit"]);
+}
+
+/// Cogging on an axis that stays where it comes to rest: the winding's warmth shows in free run alone, and there no fit finds it but
+/// the one that windows began.
+#[test]
+fn what_windows_fitted_for_nothing_begins_a_free_run() {
+    assert_eq!(names(&tried(78, 8)), ["cogging", "thermal_derating"]);
+}

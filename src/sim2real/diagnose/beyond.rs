@@ -5,7 +5,7 @@
 //! another of the registry were, that would have been found to do better.
 
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::select::Selection;
+use super::selection::Selection;
 use super::weigh::{ACCEPT, lead, squares};
 use crate::sim2real::identify::Effort;
 use crate::sim2real::{Candidate, Clock, Parameter, Twin};

@@ -12,7 +12,8 @@ use super::gates;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::noise::median;
 use super::rivals::{self, Place};
-use super::select::Selection;
+use super::select;
+use super::selection::Selection;
 use super::weigh::{ACCEPT, gain};
 use super::{Evidence, Found, Progress};
 use crate::sim2real::{Measured, Recording, Twin};
@@ -142,7 +143,7 @@ impl<S: Clone + Send + Sync> Crossings<S> {
         let Hypothesis { twin, fit, .. } = &selection.selected;
         let coarse = gates::exploring_step(twin, &fit.values, &evidence).map(|step| inquiry.twin.stepping(step));
         let twin = coarse.as_ref().unwrap_or(inquiry.twin);
-        let sought = selection.resumed(&Inquiry { twin, evidence: &evidence, ..*inquiry }, progress);
+        let sought = select::resumed(&Inquiry { twin, evidence: &evidence, ..*inquiry }, selection, progress);
         let crossings = crossings.caught_up(inquiry, &sought.selected, Late::BySteps);
         let evidence = crossings.evidence(inquiry.twin);
         let sought = sought.refitted(&Inquiry { evidence: &evidence, ..*inquiry });

@@ -7,7 +7,7 @@ use super::locate::Covariates;
 use super::needed::INFORMATIVE_ROWS;
 use super::periodic;
 use super::remainder::{MOSTLY_LEFT, NEAR_THE_NOISE, dependences, strongest};
-use super::select::Selection;
+use super::selection::Selection;
 use super::structure::{DEPENDENT, Dependence};
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Twin};

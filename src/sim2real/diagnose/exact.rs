@@ -2,7 +2,7 @@
 
 use super::decision::ABOVE_THE_NOISE;
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::select::Selection;
+use super::selection::Selection;
 use crate::sim2real::Twin;
 use crate::sim2real::identify::{Block, Fit};
 

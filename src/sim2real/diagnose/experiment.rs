@@ -11,7 +11,7 @@ use super::gates;
 use super::hypothesis::{Hypothesis, Inquiry, STARTS};
 use super::noise::median;
 use super::rivals::Place;
-use super::select::Selection;
+use super::selection::Selection;
 use super::settle::settled_by;
 use super::words::figure;
 use super::{Effect, NextExperiment, Verdict};

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::select::Selection;
+use super::selection::Selection;
 use super::weigh::{ABOVE_NOISE, ACCEPT, lead};
 use crate::sim2real::Twin;
 

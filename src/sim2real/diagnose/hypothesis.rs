@@ -83,6 +83,11 @@ const KEEPS_UP: f64 = 4.0;
 /// Bock, "Recent advances in parameter identification techniques for ODE", in *Numerical Treatment of Inverse Problems* (1983)).
 const WINDOWS: [f64; 2] = [24.0, 6.0];
 
+/// What leaves so many times what the same leaves without the last mechanism went astray: with next to nothing of it no more would be left.
+const ASTRAY: f64 = 1.5;
+/// These parts of a mechanism are next to nothing of it.
+const TIMID: [f64; 3] = [0.1, 0.03, 0.01];
+
 /// How many of a candidate's starts are followed at the most.
 pub(super) const STARTS: usize = 4;
 
@@ -115,7 +120,29 @@ impl<T: Twin> Inquiry<'_, T> {
         let twin = parent.twin.with(&self.candidates[screened.number]);
         let starts = apart(&screened.starts, twin.parameters(), most);
         let added = parent.added.iter().copied().chain([screened.number]).collect();
-        self.fitted(twin, added, &starts, Some(&parent.fit.state), effort)
+        self.boldly_or_timidly(twin, added, &starts, parent, screened, effort)
+    }
+
+    /// The best fit of `twin`, which is that of `less` with what was `screened`, from several starts; or, where all went astray, from next
+    /// to nothing of that.
+    fn boldly_or_timidly(
+        &self,
+        twin: T,
+        added: Vec<usize>,
+        starts: &[Vec<f64>],
+        less: &Hypothesis<T>,
+        screened: &Screened,
+        effort: Effort,
+    ) -> Hypothesis<T> {
+        let boldly = self.fitted(twin.clone(), added.clone(), starts, Some(&less.fit.state), effort);
+        if less.added.is_empty() || squares(&boldly) <= ASTRAY * squares(less) {
+            return boldly;
+        }
+        let own = &self.candidates[screened.number].form.parameters;
+        let Some(start) = screened.starts.first() else { return boldly };
+        let starts = TIMID.map(|part| timid(&less.fit.values, own, start, part));
+        let timidly = self.fitted(twin, added, &starts, Some(&less.fit.state), effort);
+        if squares(&timidly).total_cmp(&squares(&boldly)).is_lt() { timidly } else { boldly }
     }
 
     /// `less`, which is `whole` without one of its mechanisms, with what was `screened` in its place.
@@ -133,7 +160,7 @@ impl<T: Twin> Inquiry<'_, T> {
         let mut starts = apart(&screened.starts, twin.parameters(), STARTS);
         starts.extend(self.in_place(whole, less, screened));
         let added = less.added.iter().copied().chain([screened.number]).collect();
-        self.fitted(twin, added, &starts, Some(&less.fit.state), effort)
+        self.boldly_or_timidly(twin, added, &starts, less, screened, effort)
     }
 
     /// Of all parameters of `whole`, those of its `place`-th mechanism.
@@ -318,6 +345,18 @@ pub(super) fn free_parameters<T: Twin>(twin: &T) -> Vec<usize> {
     twin.parameters().iter().enumerate().filter(|(_, p)| !p.frozen()).map(|(k, _)| k).collect()
 }
 
+/// `values`, those of a twin, and those of a mechanism with the `parameters` that is added to it: a small `part` of the way to its `start`,
+/// which stands last of all, from where it does nothing; of what does nothing at infinity, as many times as far.
+fn timid(values: &[f64], parameters: &[Parameter], start: &[f64], part: f64) -> Vec<f64> {
+    let own = &start[start.len() - parameters.len()..];
+    let little = |(parameter, start): (&Parameter, &f64)| {
+        let nothing = parameter.nominal;
+        let value = if nothing.is_finite() { nothing + part * (start - nothing) } else { start / part };
+        value.clamp(parameter.lower, parameter.upper)
+    };
+    values.iter().copied().chain(parameters.iter().zip(own).map(little)).collect()
+}
+
 /// The first starts that differ from those before them by more than a fit makes up for in a step or two, `most` of them.
 fn apart(starts: &[Vec<f64>], parameters: &[Parameter], most: usize) -> Vec<Vec<f64>> {
     let mut kept: Vec<Vec<f64>> = Vec::new();
@@ -333,4 +372,22 @@ fn apart(starts: &[Vec<f64>], parameters: &[Parameter], most: usize) -> Vec<Vec<
         }
     }
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn next_to_nothing_of_a_mechanism_is_near_where_it_does_nothing() {
+        let parameters = [
+            Parameter::new("strength", "", 0.0).within(0.0, f64::INFINITY),
+            Parameter::new("time_constant", "s", f64::INFINITY).within(0.1, 500.0),
+            Parameter::new("sharpness", "", 2.0).within(1.99, 20.0),
+        ];
+        // One value of the twin, refitted since; then what screening would begin with.
+        let start = [0.7, 4.0, 30.0, 1.0];
+        assert_eq!(timid(&[0.9], &parameters, &start, 0.1), [0.9, 0.4, 300.0, 1.99]);
+        assert_eq!(timid(&[0.9], &parameters, &start, 0.01)[2], 500.0, "within its bounds");
+    }
 }

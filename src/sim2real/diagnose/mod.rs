@@ -49,6 +49,7 @@ mod rested;
 mod rivals;
 mod screen;
 mod select;
+mod selection;
 mod settle;
 mod structure;
 mod uncertainty;
@@ -75,7 +76,7 @@ use nalgebra::DMatrix;
 use hypothesis::Inquiry;
 use prove::Contest;
 use rivals::Place;
-use select::Selection;
+use selection::Selection;
 
 use super::any_twin::{AnyStimulus, AnyTwin, any_recordings};
 use super::{Candidate, ChannelWeight, Clock, Parameter, Recording, Seed, Signs, Simulator, Twin};
@@ -280,7 +281,7 @@ fn as_stamped(
         let on_windows = selected(&in_windows, progress);
         // What windows have found may be near enough for a free run to tell the rest.
         let near = on_windows.0.complete() && !on_windows.0.selected.added.is_empty();
-        let rest = near.then(|| on_windows.0.resumed(&inquiry, progress));
+        let rest = near.then(|| select::resumed(&inquiry, &on_windows.0, progress));
         match rest.map(|rest| rivals::settled(&inquiry, rest)).filter(|(rest, _)| rest.complete()) {
             Some(whole) => (selection, rivals) = whole,
             None if free_run::worse_than((&in_windows, &on_windows.0), &selection) => {}

@@ -10,7 +10,7 @@
 use super::carry_over::best_begun;
 use super::diagnosis::ChannelFit;
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::select::Selection;
+use super::selection::Selection;
 use super::weigh;
 use crate::sim2real::any_twin::{AnyStimulus, AnyTwin};
 use crate::sim2real::identify::{Effort, State};

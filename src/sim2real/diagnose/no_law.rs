@@ -6,7 +6,7 @@
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::locate::{Covariates, identity};
-use super::select::Selection;
+use super::selection::Selection;
 use super::structure::{about_groups, told_at_most};
 use super::weigh::ACCEPT;
 use crate::sim2real::Twin;

@@ -7,7 +7,7 @@ use super::Stretch;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::noise::fourth_difference;
 use super::rivals::Place;
-use super::select::Selection;
+use super::selection::Selection;
 use super::weigh::{ACCEPT, gain};
 use crate::sim2real::{Candidate, Clock, Measured, Recording, Signs, Simulator, Twin};
 

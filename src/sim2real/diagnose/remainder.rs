@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::locate::{Covariates, identity};
-use super::select::Selection;
+use super::selection::Selection;
 use super::structure::{DEPENDENT, Dependence, Left, foretold as regression, strongest_dependence};
 use super::whiteness::{self, ChannelMisfit};
 use crate::sim2real::identify::{Block, Fit, Problem, State};

@@ -2,12 +2,13 @@
 
 use rayon::prelude::*;
 
+use super::Score;
 use super::carry_over::carries_over;
 use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::needed::{completes, share};
 use super::screen::Screened;
-use super::select::Selection;
+use super::selection::Selection;
 use super::weigh::{evidence, gain, lead, left_open, pursued};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
@@ -22,8 +23,9 @@ pub(super) const WITHIN: f64 = 10.0;
 const NEAR: f64 = 3.0 * WITHIN;
 /// Other mechanisms fitted in the place of one: those that screening likes best without it, ...
 const BY_SCREEN: usize = 3;
-/// ... and those that stood best when they were tried beside fewer.
+/// ... and those that stood best when they were tried beside fewer, and as many more that gained no less than this part of what it did.
 const BY_GAIN: usize = 3;
+const NEARLY: f64 = 0.8;
 
 /// The rivals of one selected mechanism.
 #[derive(Debug, Clone, PartialEq)]
@@ -192,10 +194,12 @@ fn likely<'s, T: Twin>(
         own.contains.contains(&other.name) || other.contains.contains(&own.name) || simpler && own.site == other.site
     };
     let name = |one: &Screened| inquiry.candidates[one.number].about.name;
+    let own_name = inquiry.candidates[own].about.name;
+    let stage = best_stage(&selection.scores, own_name);
     let gained = |one: &Screened| {
         let Candidate { about, form, .. } = &inquiry.candidates[one.number];
         let tried = selection.scores.iter().filter(|s| s.mechanism == about.name && s.form == form.name);
-        tried.filter_map(|s| s.gain).filter(|gain| *gain > 0.0).fold(0.0, f64::max)
+        tried.filter(|s| Some(s.stage) == stage).filter_map(|s| s.gain).filter(|gain| *gain > 0.0).fold(0.0, f64::max)
     };
     let mut order: Vec<&Screened> = screened.iter().collect();
     let mut kept: Vec<&Screened> = Vec::new();
@@ -209,9 +213,22 @@ fn likely<'s, T: Twin>(
         }
     };
     keep(&gained, BY_GAIN);
+    let of_own = selection.scores.iter().filter(|s| Some(s.stage) == stage && s.mechanism == own_name);
+    let nearly = NEARLY * of_own.filter_map(|s| s.gain).fold(0.0, f64::max);
+    keep(&|one| if gained(one) > nearly { gained(one) } else { 0.0 }, BY_GAIN);
     keep(&|one| one.score, BY_SCREEN);
     keep(&|one| if kin(one) { 1.0 + one.score } else { 0.0 }, screened.len());
     kept
+}
+
+/// The stage in which the fewest others gained more than the mechanism of that `name`: what did well beside the same as it did may do as
+/// well in its place, and what gained more before it, as another of the set did, may not.
+fn best_stage(scores: &[Score], name: &str) -> Option<usize> {
+    let ahead = |own: &Score| -> usize {
+        let better = |other: &&Score| other.stage == own.stage && other.mechanism != name && other.gain > own.gain;
+        scores.iter().filter(better).count()
+    };
+    scores.iter().filter(|s| s.mechanism == name && s.gain.is_some()).min_by_key(|s| (ahead(s), s.stage)).map(|s| s.stage)
 }
 
 /// The forms not tried yet of the rivals that come near, and of the special cases of candidate `own`: one of these is as good as that law
@@ -285,6 +302,32 @@ fn slight<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, special: &Hy
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rivals_are_those_that_did_well_where_a_name_did_best() {
+        let score = |mechanism: &str, stage, gain: f64| Score {
+            mechanism: mechanism.to_owned(),
+            form: String::new(),
+            stage,
+            screen: 0.0,
+            survival: 1.0,
+            excited: true,
+            gain: (gain > 0.0).then_some(gain),
+            accepted: false,
+        };
+        // Alone a spring gains much, and frictions more; beside one of these nothing gains as much as it.
+        let scores = [
+            score("friction", 0, 9_000.0),
+            score("hysteresis", 0, 8_000.0),
+            score("spring", 0, 900.0),
+            score("spring", 1, 400.0),
+            score("hysteresis", 1, 20.0),
+        ];
+        assert_eq!(best_stage(&scores, "spring"), Some(1));
+        assert_eq!(best_stage(&scores, "friction"), Some(0));
+        assert_eq!(best_stage(&scores, "hysteresis"), Some(0), "as many ahead of it: the first");
+        assert_eq!(best_stage(&scores, "lag"), None);
+    }
 
     #[test]
     fn the_one_unsure_name_of_three_is_a_stand_in() {

@@ -3,12 +3,13 @@
 use rayon::prelude::*;
 
 use super::forms::in_best_forms;
-use super::free_run::{steadiest_first, strays};
+use super::free_run::steadiest_first;
 use super::hypothesis::{Hypothesis, Inquiry, STARTS};
 use super::needed::needed_share;
 use super::prune::pruned;
 use super::screen::Screened;
-use super::weigh::{ABOVE_NOISE, ACCEPT, gain, lead, pursued, ranked, squares};
+use super::selection::Selection;
+use super::weigh::{ACCEPT, gain, lead, ranked, squares};
 use super::whiteness::ChannelMisfit;
 use super::{Progress, Score};
 use crate::sim2real::identify::Effort;
@@ -31,6 +32,9 @@ const FINISHED: usize = 5;
 const FAR_BEHIND: f64 = 0.5;
 /// ... unless it leaves no more than this many times as much: with residuals as correlated as theirs, gains say little.
 const AS_MUCH: f64 = 1.5;
+/// Of the sets of each stage so many are kept, and so many of those with one mechanism more than was selected begin a resumed selection.
+const IN_MIND: usize = 12;
+const KNOWN: usize = 3;
 /// What leaves so many times less than all of the beam is in it, however little its gain.
 const BY_FAR: f64 = 2.0;
 /// Mechanisms of several forms of which all are fitted: those that stood best in the form that screening liked best.
@@ -57,35 +61,25 @@ const ALWAYS_FITTED: usize = 3;
 /// what acceptance asks for: once more is explained, residuals hold more evidence.
 const BENEFIT_OF_DOUBT: f64 = 4.0;
 
-/// The outcome of a selection.
-pub(super) struct Selection<T> {
-    /// The twin as given, refitted.
-    pub recalibrated: Hypothesis<T>,
-    /// The set that was selected; the same as `recalibrated` where nothing was.
-    pub selected: Hypothesis<T>,
-    /// `selected` with one mechanism left out, in the order of its mechanisms.
-    pub without: Vec<Hypothesis<T>>,
-    /// Every mechanism tried in every stage.
-    pub scores: Vec<Score>,
-}
-
 /// Selects stage by stage, then leaves out again what the whole does not need.
 pub(super) fn select<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     recalibrated: Hypothesis<T>,
     progress: Progress<'_>,
 ) -> Selection<T> {
-    selected_from(inquiry, recalibrated, None, progress)
+    selected_from(inquiry, recalibrated, None, Vec::new(), progress)
 }
 
-/// The same, going on from `start` if there is one.
+/// The same, going on from `start` if there is one, and with the fits that are `known` of what is beside it.
 fn selected_from<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     recalibrated: Hypothesis<T>,
     start: Option<Hypothesis<T>>,
+    mut known: Vec<Hypothesis<T>>,
     progress: Progress<'_>,
 ) -> Selection<T> {
     let mut scores = Vec::new();
+    let mut fitted: Vec<Hypothesis<T>> = Vec::new();
     let mut beam = vec![start.clone().unwrap_or_else(|| recalibrated.clone())];
     let first_stage = start.as_ref().map_or(0, |start| start.added.len());
     let mut best_of_stage: Vec<Hypothesis<T>> = start.into_iter().collect();
@@ -93,13 +87,20 @@ fn selected_from<T: Twin>(
         progress("comparing mechanisms", stage, STAGES);
         let (mut children, tried) = expand(inquiry, &recalibrated, &beam, stage);
         scores.extend(tried);
+        if !known.is_empty() {
+            children.append(&mut known);
+            children = ranked(inquiry, &beam[0], children);
+        }
         if stage > 0 {
             children = in_best_forms(inquiry, &beam[0], children);
         }
         let parent = best_of_stage.last().unwrap_or(&recalibrated);
         steadiest_first(inquiry, &recalibrated, parent, &mut children);
+        fitted.extend(children.iter().take(IN_MIND).cloned());
         let Some(best) = children.first().cloned() else { break };
-        let promising = gain(inquiry, parent, &best) > ACCEPT || stage == 0 && best.leaves_something();
+        let promising = gain(inquiry, parent, &best) > ACCEPT
+            || stage == 0 && best.leaves_something()
+            || squares(&best) * BY_FAR < squares(parent);
         best_of_stage.push(best);
         if !promising {
             break;
@@ -107,7 +108,19 @@ fn selected_from<T: Twin>(
         beam = built_on(inquiry, &recalibrated, &beam[0], children);
     }
     let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
-    Selection { recalibrated, selected, without, scores }
+    Selection { recalibrated, selected, without, fitted, scores }
+}
+
+/// What is found beside `selection` as another inquiry follows the recordings. What was of no use beside it so far may do much there, and a
+/// fit finds it that begins from where it stood.
+pub(super) fn resumed<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, progress: Progress<'_>) -> Selection<T> {
+    let start = inquiry.refitted_afresh(&selection.selected);
+    let recalibrated = inquiry.refitted_afresh(&selection.recalibrated);
+    let known: Vec<&Hypothesis<T>> = selection.beside(inquiry).take(KNOWN).collect();
+    let known = known.into_par_iter().map(|more| inquiry.refitted_afresh(more)).collect();
+    let found = selected_from(inquiry, recalibrated, Some(start), known, progress);
+    let scores = selection.scores.iter().cloned().chain(found.scores).collect();
+    Selection { scores, ..found }
 }
 
 /// Which of the `children` of the best of the last stage and of others, best first, are built on. The best alone may be the wrong one,
@@ -138,91 +151,6 @@ fn least_by_far<T>(children: &[Hypothesis<T>]) -> Option<usize> {
     let left: Vec<f64> = children.iter().map(squares).collect();
     let least = (BEAM..left.len()).min_by(|a, b| left[*a].total_cmp(&left[*b]))?;
     left[..BEAM].iter().all(|other| *other > BY_FAR * left[least]).then_some(least)
-}
-
-impl<T: Twin> Selection<T> {
-    /// Whether what was selected leaves hardly more than the noise.
-    pub fn complete(&self) -> bool {
-        self.selected.within(ABOVE_NOISE)
-    }
-
-    /// Notes what was added as it is, after everything else.
-    pub fn note_finished(&mut self, candidate: &Candidate, gain: f64) {
-        self.scores.push(Score {
-            mechanism: candidate.about.name.to_owned(),
-            form: candidate.form.name.to_owned(),
-            stage: self.selected.added.len() - 1,
-            screen: 0.0,
-            survival: 1.0,
-            gain: Some(gain),
-            accepted: true,
-            excited: true,
-        });
-    }
-
-    /// Marks the scores of what was selected, each in the last stage in which it was tried.
-    pub fn mark_accepted(&mut self, candidates: &[Candidate]) {
-        for number in &self.selected.added {
-            let Candidate { about, form, .. } = &candidates[*number];
-            let own = |s: &&mut Score| s.mechanism == about.name && s.form == form.name && s.gain.is_some();
-            if let Some(score) = self.scores.iter_mut().filter(own).max_by_key(|s| s.stage) {
-                score.accepted = true;
-            }
-        }
-    }
-
-    /// The same selection fitted with another inquiry's step of integration, and what is no longer needed left out.
-    pub fn refitted(&self, inquiry: &Inquiry<'_, T>) -> Self {
-        let recalibrated = inquiry.refitted(&self.recalibrated);
-        let whole = if self.selected.added.is_empty() { Vec::new() } else { vec![inquiry.refitted(&self.selected)] };
-        let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, whole);
-        Self { recalibrated, selected, without, scores: self.scores.clone() }
-    }
-
-    /// What is found beside this selection as another inquiry follows the recordings.
-    pub fn resumed(&self, inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> Self {
-        let start = inquiry.refitted_afresh(&self.selected);
-        let selection = selected_from(inquiry, inquiry.refitted_afresh(&self.recalibrated), Some(start), progress);
-        let scores = self.scores.iter().cloned().chain(selection.scores).collect();
-        Self { scores, ..selection }
-    }
-
-    /// This selection, nothing of it fitted anew, as another inquiry sees it.
-    pub fn seen(&self, inquiry: &Inquiry<'_, T>) -> Self {
-        Self {
-            recalibrated: inquiry.seen(&self.recalibrated),
-            selected: inquiry.seen(&self.selected),
-            without: self.without.iter().map(|less| inquiry.seen(less)).collect(),
-            scores: self.scores.clone(),
-        }
-    }
-
-    /// The selection without its `place`-th mechanism.
-    pub fn dropped(&self, inquiry: &Inquiry<'_, T>, place: usize) -> Self {
-        let (recalibrated, selected, without) = pruned(inquiry, &self.recalibrated, vec![self.without[place].clone()]);
-        Self { recalibrated, selected, without, scores: self.scores.clone() }
-    }
-
-    /// The selection with the `place`-th mechanism replaced by candidate `other`, and what is no longer needed left out.
-    pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
-        let less = &self.without[place];
-        let screened = inquiry.screened(less).into_iter().find(|s| s.number == other)?;
-        // On the way on which it was found to be better.
-        let whole = pursued(inquiry, &self.recalibrated, &self.selected, less, &screened);
-        let (recalibrated, selected, without) = pruned(inquiry, &self.recalibrated, vec![whole]);
-        // A simpler law is preferred although it explains a little less.
-        let simpler = selected.free() < self.selected.free()
-            && self.selected.added.get(place).is_some_and(|own| {
-                let (own, other) = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
-                own.contains.contains(&other.name)
-            });
-        let kept = selected.added.len() >= self.selected.added.len();
-        let better = lead(inquiry, &recalibrated, &selected, &self.selected) > 0.0;
-        if strays(inquiry, &self.selected, &selected) {
-            return None;
-        }
-        (better || simpler && kept).then(|| Self { recalibrated, selected, without, scores: self.scores.clone() })
-    }
 }
 
 /// A candidate that may be fitted beside one of the beam.

@@ -5,7 +5,7 @@
 use super::NextExperiment;
 use super::hypothesis::Inquiry;
 use super::rivals::{Place, WITHIN};
-use super::select::Selection;
+use super::selection::Selection;
 use crate::sim2real::Twin;
 
 /// Evidence that is less than this is chance: nobody knows of how many messages it would be more.

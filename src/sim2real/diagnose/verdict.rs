@@ -7,7 +7,7 @@ use super::decision::{FEWEST_ROWS, FORETOLD, Findings, decide};
 use super::diagnosis::{Checks, Diagnosis, ParameterChange, SCHEMA, Score, Verdict, Where};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::Place;
-use super::select::Selection;
+use super::selection::Selection;
 use super::structure::DEPENDENT;
 use super::{effects, whiteness, words};
 use crate::sim2real::{Candidate, Clock, Part, Twin};

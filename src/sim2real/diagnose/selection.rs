@@ -1,0 +1,123 @@
+//! A selection: the set of mechanisms that was selected, what it does without each of them, and how all others did; and how it changes.
+
+use super::Score;
+use super::free_run::strays;
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::prune::pruned;
+use super::weigh::{ABOVE_NOISE, lead, pursued};
+use crate::sim2real::{Candidate, Twin};
+
+/// The outcome of a selection.
+pub(super) struct Selection<T> {
+    /// The twin as given, refitted.
+    pub recalibrated: Hypothesis<T>,
+    /// The set that was selected; the same as `recalibrated` where nothing was.
+    pub selected: Hypothesis<T>,
+    /// `selected` with one mechanism left out, in the order of its mechanisms.
+    pub without: Vec<Hypothesis<T>>,
+    /// The sets that did best in each stage.
+    pub fitted: Vec<Hypothesis<T>>,
+    /// Every mechanism tried in every stage.
+    pub scores: Vec<Score>,
+}
+
+impl<T: Twin> Selection<T> {
+    /// Whether what was selected leaves hardly more than the noise.
+    pub fn complete(&self) -> bool {
+        self.selected.within(ABOVE_NOISE)
+    }
+
+    /// What was fitted of the selected mechanisms and one more, in the order in which it did well.
+    pub fn beside<'a>(&'a self, inquiry: &'a Inquiry<'_, T>) -> impl Iterator<Item = &'a Hypothesis<T>> {
+        let names = |set: &[usize]| set.iter().map(|n| inquiry.candidates[*n].about.name).collect::<Vec<_>>();
+        let selected = names(&self.selected.added);
+        self.fitted.iter().filter(move |fitted| one_more(&names(&fitted.added), &selected))
+    }
+
+    /// Notes what was added as it is, after everything else.
+    pub fn note_finished(&mut self, candidate: &Candidate, gain: f64) {
+        self.scores.push(Score {
+            mechanism: candidate.about.name.to_owned(),
+            form: candidate.form.name.to_owned(),
+            stage: self.selected.added.len() - 1,
+            screen: 0.0,
+            survival: 1.0,
+            gain: Some(gain),
+            accepted: true,
+            excited: true,
+        });
+    }
+
+    /// Marks the scores of what was selected, each in the last stage in which it was tried.
+    pub fn mark_accepted(&mut self, candidates: &[Candidate]) {
+        for number in &self.selected.added {
+            let Candidate { about, form, .. } = &candidates[*number];
+            let own = |s: &&mut Score| s.mechanism == about.name && s.form == form.name && s.gain.is_some();
+            if let Some(score) = self.scores.iter_mut().filter(own).max_by_key(|s| s.stage) {
+                score.accepted = true;
+            }
+        }
+    }
+
+    /// The same selection fitted with another inquiry's step of integration, and what is no longer needed left out.
+    pub fn refitted(&self, inquiry: &Inquiry<'_, T>) -> Self {
+        let recalibrated = inquiry.refitted(&self.recalibrated);
+        let whole = if self.selected.added.is_empty() { Vec::new() } else { vec![inquiry.refitted(&self.selected)] };
+        self.with_set(pruned(inquiry, &recalibrated, whole))
+    }
+
+    /// This selection, nothing of it fitted anew, as another inquiry sees it.
+    pub fn seen(&self, inquiry: &Inquiry<'_, T>) -> Self {
+        let without = self.without.iter().map(|less| inquiry.seen(less)).collect();
+        self.with_set((inquiry.seen(&self.recalibrated), inquiry.seen(&self.selected), without))
+    }
+
+    /// The selection without its `place`-th mechanism.
+    pub fn dropped(&self, inquiry: &Inquiry<'_, T>, place: usize) -> Self {
+        self.with_set(pruned(inquiry, &self.recalibrated, vec![self.without[place].clone()]))
+    }
+
+    /// The selection with the `place`-th mechanism replaced by candidate `other`, and what is no longer needed left out.
+    pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
+        let less = &self.without[place];
+        let screened = inquiry.screened(less).into_iter().find(|s| s.number == other)?;
+        // On the way on which it was found to be better.
+        let whole = pursued(inquiry, &self.recalibrated, &self.selected, less, &screened);
+        let swapped = self.with_set(pruned(inquiry, &self.recalibrated, vec![whole]));
+        let selected = &swapped.selected;
+        // A simpler law is preferred although it explains a little less.
+        let simpler = selected.free() < self.selected.free()
+            && self.selected.added.get(place).is_some_and(|own| {
+                let (own, other) = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
+                own.contains.contains(&other.name)
+            });
+        let kept = selected.added.len() >= self.selected.added.len();
+        let better = lead(inquiry, &swapped.recalibrated, selected, &self.selected) > 0.0;
+        if strays(inquiry, &self.selected, selected) {
+            return None;
+        }
+        (better || simpler && kept).then_some(swapped)
+    }
+
+    /// What this selection with_sets with another set selected: all that was tried remains known.
+    fn with_set(&self, (recalibrated, selected, without): (Hypothesis<T>, Hypothesis<T>, Vec<Hypothesis<T>>)) -> Self {
+        Self { recalibrated, selected, without, fitted: self.fitted.clone(), scores: self.scores.clone() }
+    }
+}
+
+/// Whether `more` is `set` with one name more.
+fn one_more(more: &[&str], set: &[&str]) -> bool {
+    more.len() == set.len() + 1 && set.iter().all(|name| more.contains(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_more_has_all_the_others() {
+        assert!(one_more(&["friction", "cogging"], &["cogging"]) && one_more(&["lag"], &[]));
+        assert!(!one_more(&["friction", "lag"], &["cogging"]), "another two");
+        assert!(!one_more(&["cogging"], &["cogging"]) && !one_more(&["a", "b", "c"], &["a"]));
+    }
+}
