@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::hypothesis::{Hypothesis, Inquiry};
+use super::hypothesis::{Hypothesis, Inquiry, KEEPS_UP};
 use super::selection::Selection;
-use super::weigh::{ABOVE_NOISE, ACCEPT, lead};
+use super::weigh::{ABOVE_NOISE, ACCEPT, gain, lead};
 use crate::sim2real::Twin;
 
 /// Of so many hypotheses that come near the best on windows, the one that does best in free run is taken.
@@ -58,6 +58,20 @@ pub(super) fn strays<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, wh
         (Some(less), Some(whole)) => whole > STRAYS * less,
         _ => false,
     }
+}
+
+/// Whether what free run `found` beside what was selected on windows is there: that keeps up with the recordings by itself, or windows gain
+/// by what was found, too. Where a plant can come to rest in one place or in the next, whatever moves it a little may bring it to the right
+/// one by chance.
+pub(super) fn bears_out<T: Twin>(
+    windows: (&Inquiry<'_, T>, &Selection<T>),
+    free_run: (&Inquiry<'_, T>, &Selection<T>),
+) -> bool {
+    let (in_windows, selection) = windows;
+    let (in_free_run, found) = free_run;
+    found.selected.set() == selection.selected.set()
+        || in_free_run.refitted_afresh(&selection.selected).within(KEEPS_UP)
+        || gain(in_windows, &selection.selected, &in_windows.refitted_afresh(&found.selected)) > 0.0
 }
 
 /// Whether what was selected on windows does so much worse in free run than what was selected there, or so much as worse at greater

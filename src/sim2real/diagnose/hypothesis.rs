@@ -78,7 +78,7 @@ pub(super) struct Inquiry<'a, T: Twin> {
 }
 
 /// A twin that leaves at most this many times the mean square of the noise keeps up with its recordings.
-const KEEPS_UP: f64 = 4.0;
+pub(super) const KEEPS_UP: f64 = 4.0;
 /// Into so many windows recordings are cut, one after the other, to bring a twin near one that it does not follow (multiple shooting:
 /// Bock, "Recent advances in parameter identification techniques for ODE", in *Numerical Treatment of Inverse Problems* (1983)).
 const WINDOWS: [f64; 2] = [24.0, 6.0];

@@ -282,7 +282,9 @@ fn as_stamped(
         // What windows have found may be near enough for a free run to tell the rest.
         let near = on_windows.0.complete() && !on_windows.0.selected.added.is_empty();
         let rest = near.then(|| select::resumed(&inquiry, &on_windows.0, progress));
-        match rest.map(|rest| rivals::settled(&inquiry, rest)).filter(|(rest, _)| rest.complete()) {
+        let there =
+            |rest: &Selection<_>| rest.complete() && free_run::bears_out((&in_windows, &on_windows.0), (&inquiry, rest));
+        match rest.map(|rest| rivals::settled(&inquiry, rest)).filter(|(rest, _)| there(rest)) {
             Some(whole) => (selection, rivals) = whole,
             None if free_run::worse_than((&in_windows, &on_windows.0), &selection) => {}
             None => {
