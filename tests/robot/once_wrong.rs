@@ -420,3 +420,21 @@ fn what_leaves_far_less_is_gone_on_from_though_it_gains_nothing() {
 fn what_windows_fitted_for_nothing_begins_a_free_run() {
     assert_eq!(names(&tried(78, 8)), ["cogging", "thermal_derating"]);
 }
+
+/// Cogging alone, which windows show; followed from the start on, the axis came to the right tooth with a compliance in its drive, too,
+/// of which windows show nothing.
+#[test]
+fn what_brings_a_free_run_to_the_right_tooth_by_chance_is_not_named() {
+    assert_eq!(names(&tried(76, 7)), ["cogging"]);
+}
+
+/// A spring that hardens, beside friction that is most of the misfit: laws that gained more alone were its rivals, all of them frictions,
+/// and it was named a wrong scale with nothing beside it.
+#[test]
+fn the_rivals_of_a_second_effect_are_those_that_did_well_beside_the_first() {
+    let trial = tried(80, 108);
+    let second = trial.found.iter().find(|found| found.mechanism != "coulomb_friction").unwrap();
+    let it = |name: &str| second.mechanism == name || second.rivals.iter().any(|rival| rival == name);
+    assert!(it("cubic_stiffness") && it("scale"), "{:?}", trial.found);
+    assert_eq!((trial.found.len(), trial.verdict), (2, Verdict::Ambiguous));
+}
