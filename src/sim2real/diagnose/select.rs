@@ -35,7 +35,8 @@ const AS_MUCH: f64 = 1.5;
 /// Of the sets of each stage so many are kept, and so many of those with one mechanism more than was selected begin a resumed selection.
 const IN_MIND: usize = 12;
 const KNOWN: usize = 3;
-/// What leaves so many times less than all of the beam is in it, however little its gain.
+/// What leaves so many times less than all of the beam is in it, and what leaves so many times less than what it builds on is gone on from,
+/// however little its gain.
 const BY_FAR: f64 = 2.0;
 /// Mechanisms of several forms of which all are fitted: those that stood best in the form that screening liked best.
 const IN_ALL_FORMS: usize = 3;

@@ -99,7 +99,7 @@ impl<T: Twin> Selection<T> {
         (better || simpler && kept).then_some(swapped)
     }
 
-    /// What this selection with_sets with another set selected: all that was tried remains known.
+    /// This selection with another set selected: all that was tried remains known.
     fn with_set(&self, (recalibrated, selected, without): (Hypothesis<T>, Hypothesis<T>, Vec<Hypothesis<T>>)) -> Self {
         Self { recalibrated, selected, without, fitted: self.fitted.clone(), scores: self.scores.clone() }
     }
