@@ -22,7 +22,8 @@ const HALVINGS: usize = 7;
 /// A step that comes nearer by less than this part is the last.
 const LITTLE: f64 = 0.02;
 
-/// An arm that leaves less than this part of what small changes of it leave hides an effect.
+/// An arm that leaves less than this part of what small changes of it leave hides an effect; where the nearest it comes leaves more than
+/// the inverse, small changes told nothing.
 const HIDDEN: f64 = 0.5;
 
 /// What may be refitted: an arm with what acts on it, and how it is driven.
@@ -36,15 +37,15 @@ pub(super) struct Refit<'a> {
 }
 
 impl Refit<'_> {
-    /// Whether another arm does by itself most of what the effects in `all` do to this one beyond its own, though no small change of this one would: near
-    /// its highest point next to nothing decides how it moves on, and how much that moves it tells nothing of how large an effect is.
+    /// Whether the effects in `all` do nothing to this arm beyond its own that would tell how large they are, though small changes of it
+    /// would not do the same.
+    ///
+    /// Another arm may do most of it by itself. Or what small changes of this one do foretells nothing of larger ones: near its highest
+    /// point next to nothing decides how it moves on.
     pub fn hides(&self, all: &[Effect], hideable: &Hideable) -> bool {
-        if self.arm.adds_up() {
-            return false;
-        }
         let (without, with) = (self.rows(UNCHANGED), Refit { effects: all, ..*self }.rows(UNCHANGED));
-        let left = || self.left(&with) < HIDDEN * hideable.size(with.as_slice(), without.as_slice(), 1.0);
-        (&with - &without).amax() > PI || left()
+        let size = hideable.size(with.as_slice(), without.as_slice(), 1.0);
+        size > 0.0 && ((&with - &without).amax() > PI || misjudged(size, self.left(&with)))
     }
 
     /// Positions, row by row, after a relative change of all that is free.
@@ -96,8 +97,16 @@ impl Refit<'_> {
             })
             .collect();
         let jacobian = DMatrix::from_columns(&columns);
-        (jacobian.tr_mul(&jacobian)).cholesky().map(|c| c.solve(&jacobian.tr_mul(&(positions - rows))))
+        let mut curvature = jacobian.tr_mul(&jacobian);
+        // What an arm does not have, as gravity, stays as it is.
+        (0..FREE).filter(|k| columns[*k].amax() == 0.0).for_each(|k| curvature[(k, k)] = 1.0);
+        curvature.cholesky().map(|c| c.solve(&jacobian.tr_mul(&(positions - rows))))
     }
+}
+
+/// Whether a `size`, which is what small changes of an arm leave, is not that of what the nearest arm leaves.
+fn misjudged(size: f64, left: f64) -> bool {
+    left < HIDDEN * size || left > size / HIDDEN
 }
 
 #[cfg(test)]
@@ -116,6 +125,9 @@ mod tests {
         let drive = drive();
         let refit = |arm: Arm| Refit { arm, effects: &[], drive: &drive, seed: Seed(0), scales: [0.8, 3.0] };
         let other = Arm { inertia: 0.12, viscous_friction: 0.17, gravity_torque: 2.2, ..arm };
+        // One without gravity has none to be refitted.
+        let [level, other_level] = [arm, other].map(|arm| Arm { gravity_torque: 0.0, ..arm });
+        assert!(refit(level).left(&refit(other_level).rows(UNCHANGED)) < 1e-3);
         let theirs = refit(other).rows(UNCHANGED);
         assert!((0.7..2.5).contains(&theirs.amax()), "{}", theirs.amax());
         let apart = (refit(arm).rows(UNCHANGED) - &theirs).norm() / 50.0;
@@ -123,6 +135,13 @@ mod tests {
         assert!(left < 1e-3 * apart, "{left} of {apart}");
         let shaken = &theirs + DVector::from_fn(2_500, |row, _| if row % 2 == 0 { 0.05 } else { -0.05 });
         assert!((refit(arm).left(&shaken) / 0.05 - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_size_is_what_the_nearest_arm_leaves_or_nothing() {
+        assert!(!misjudged(1.0, 0.9) && !misjudged(1.0, 1.2));
+        assert!(misjudged(1.0, 0.3), "another arm does most of it");
+        assert!(misjudged(1.0, 3.0), "small changes foretold what no arm does");
     }
 
     /// An arm that is pushed to just below its highest point, and by just a little more over it.
