@@ -438,3 +438,17 @@ fn the_rivals_of_a_second_effect_are_those_that_did_well_beside_the_first() {
     assert!(it("cubic_stiffness") && it("scale"), "{:?}", trial.found);
     assert_eq!((trial.found.len(), trial.verdict), (2, Verdict::Ambiguous));
 }
+
+/// A sensor that is wrong on one side, and off by an offset that comes after: the offset was found first, and what came after it was folded
+/// elsewhere.
+#[test]
+fn what_acts_before_what_was_found_first_is_found_there() {
+    assert_eq!(names(&tried(1026, 73)), ["bias", "rectification"]);
+}
+
+/// Plain friction that follows to within a fifth of the noise, and friction that rests on the load as well: the wider law left noise alone, by
+/// less than what the form of any law is off by.
+#[test]
+fn what_a_form_is_off_by_is_not_what_a_wider_law_completes() {
+    assert_eq!(names(&tried(1026, 351)), ["coulomb_friction"]);
+}

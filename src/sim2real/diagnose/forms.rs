@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::weigh::{ABOVE_NOISE, ACCEPT, gain, lead, pursued, ranked};
+use super::pursue::pursued;
+use super::weigh::{ABOVE_NOISE, ACCEPT, gain, lead, ranked};
 use crate::sim2real::{Candidate, Twin};
 
 /// Hypotheses behind the best by no more than this, and no more than so many, are tried in their other forms.

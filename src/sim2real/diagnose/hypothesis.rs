@@ -244,7 +244,7 @@ impl<T: Twin> Inquiry<'_, T> {
     }
 
     /// The twin with what was `added`, with this inquiry's step of integration.
-    fn with(&self, added: &[usize]) -> T {
+    pub fn with(&self, added: &[usize]) -> T {
         added.iter().fold(self.twin.clone(), |twin, number| twin.with(&self.candidates[*number]))
     }
 

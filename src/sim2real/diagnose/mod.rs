@@ -38,16 +38,19 @@ mod needed;
 mod no_law;
 mod noise;
 mod onset;
+mod order;
 mod periodic;
 mod profile;
 mod prove;
 mod prune;
+mod pursue;
 mod recognize;
 mod record;
 mod remainder;
 mod rested;
 mod rivals;
 mod screen;
+mod search;
 mod select;
 mod selection;
 mod settle;
@@ -75,8 +78,6 @@ use nalgebra::DMatrix;
 
 use hypothesis::Inquiry;
 use prove::Contest;
-use rivals::Place;
-use selection::Selection;
 
 use super::any_twin::{AnyStimulus, AnyTwin, any_recordings};
 use super::{Candidate, ChannelWeight, Clock, Parameter, Recording, Seed, Signs, Simulator, Twin};
@@ -272,26 +273,11 @@ fn as_stamped(
     progress("dividing the recordings", 0, 1);
     let evidence = Evidence::divide(twin, recordings, held_out);
     let candidates = recognize::fixed(twin.candidates(recordings));
-    // Where a plant adds up errors, a free run tells most if the physics is complete, and hardly anything if it is not.
     let free_run = evidence.in_free_run();
     let mut inquiry = Inquiry { twin, candidates: &candidates, evidence: &free_run, seed };
-    let (mut selection, mut rivals) = selected(&inquiry, progress);
-    if evidence.window.is_some() && !selection.complete() {
-        let in_windows = Inquiry { evidence: &evidence, ..inquiry };
-        let on_windows = selected(&in_windows, progress);
-        // What windows have found may be near enough for a free run to tell the rest.
-        let near = on_windows.0.complete() && !on_windows.0.selected.added.is_empty();
-        let rest = near.then(|| select::resumed(&inquiry, &on_windows.0, progress));
-        let there =
-            |rest: &Selection<_>| rest.complete() && free_run::bears_out((&in_windows, &on_windows.0), (&inquiry, rest));
-        match rest.map(|rest| rivals::settled(&inquiry, rest)).filter(|(rest, _)| there(rest)) {
-            Some(whole) => (selection, rivals) = whole,
-            None if free_run::worse_than((&in_windows, &on_windows.0), &selection) => {}
-            None => {
-                (selection, rivals) = on_windows;
-                inquiry = in_windows;
-            }
-        }
+    let (mut selection, mut rivals, on_windows) = search::searched(&inquiry, &evidence, progress);
+    if on_windows {
+        inquiry.evidence = &evidence;
     }
     if let Some((beneath, places)) = crossings::beneath(&inquiry, &selection, [recordings, held_out], found, progress) {
         inquiry.evidence = &free_run;
@@ -386,33 +372,6 @@ fn shown(fit: &Fit, parameters: &[Parameter]) -> Fit {
         known.at_bound.retain(|at| *at != k);
     }
     known
-}
-
-/// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.
-fn selected<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> (Selection<T>, Vec<Place>) {
-    progress("refitting the twin's own parameters", 0, 1);
-    let given: Vec<f64> = inquiry.twin.parameters().iter().map(|p| p.nominal).collect();
-    if let Some(step) = gates::exploring_step(inquiry.twin, &given, inquiry.evidence) {
-        let twin = inquiry.twin.stepping(step);
-        let coarse = Inquiry { twin: &twin, ..*inquiry };
-        let selection = select::select(&coarse, coarse.recalibrated(), progress);
-        progress("looking for rivals", 0, 1);
-        let (selection, rivals) = rivals::settled(&coarse, selection);
-        let best = &selection.selected;
-        let moved = gates::moved(&best.twin, &best.fit.values, inquiry.evidence, step, gates::own_step(inquiry.twin));
-        progress("fitting with the twin's own step", 0, 1);
-        let refitted = selection.refitted(inquiry);
-        if moved < gates::SETTLED && refitted.selected.added == selection.selected.added {
-            return (refitted, rivals);
-        }
-        let (refitted, rivals) = rivals::settled(inquiry, refitted);
-        if moved < gates::SETTLED || refitted.complete() {
-            return (refitted, rivals);
-        }
-    }
-    let selection = select::select(inquiry, inquiry.recalibrated(), progress);
-    progress("looking for rivals", 0, 1);
-    rivals::settled(inquiry, selection)
 }
 
 /// Refits the parameters that `twin` has, and adds nothing.

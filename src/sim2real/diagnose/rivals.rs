@@ -7,9 +7,10 @@ use super::carry_over::carries_over;
 use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::needed::{completes, share};
+use super::pursue::pursued;
 use super::screen::Screened;
 use super::selection::Selection;
-use super::weigh::{evidence, gain, lead, left_open, pursued};
+use super::weigh::{evidence, gain, lead, left_open};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
@@ -291,12 +292,14 @@ fn loss<T: Twin>(
     loss
 }
 
-/// Whether `law` explains so little more of the first misfit than a special case of it that the form of that may be all it makes up for.
+/// Whether `law` explains so little more of the first misfit than a special case of it that the form of that may be all it makes up for: of
+/// one alone of signals also where the law leaves nothing else, if that is no more than any form is off by.
 fn slight<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, special: &Hypothesis<T>, law: &Hypothesis<T>) -> bool {
+    let (sampled, explained) = (inquiry.twin.clock() != Clock::Event, share(first, special, law));
     let beyond_form = || evidence(inquiry, first, law, special) > NOT_SLIGHT && carries_over(inquiry, special, law);
-    share(first, special, law) < SLIGHT
-        && !completes(special, law)
-        && !(inquiry.twin.clock() != Clock::Event && beyond_form())
+    let off_by = sampled && special.added.len() == 1 && explained < OFF_BY;
+    let of_form = explained < SLIGHT && !completes(special, law) || off_by;
+    of_form && !(sampled && beyond_form())
 }
 
 #[cfg(test)]

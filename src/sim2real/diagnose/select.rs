@@ -6,6 +6,7 @@ use super::forms::in_best_forms;
 use super::free_run::steadiest_first;
 use super::hypothesis::{Hypothesis, Inquiry, STARTS};
 use super::needed::needed_share;
+use super::order::in_either_order;
 use super::prune::pruned;
 use super::screen::Screened;
 use super::selection::Selection;
@@ -180,7 +181,8 @@ fn expand<T: Twin>(
     once(beam, &mut jobs);
     let fit = |starts: &[usize]| -> Vec<Option<Hypothesis<T>>> {
         let one = |(Job { place, screened, .. }, starts): (&Job, &usize)| {
-            (*starts > 0).then(|| inquiry.extended(&beam[*place], screened, *starts, Effort::Brief))
+            let extended = || inquiry.extended(&beam[*place], screened, *starts, Effort::Brief);
+            (*starts > 0).then(|| in_either_order(inquiry, extended(), Effort::Brief))
         };
         jobs.par_iter().zip(starts).map(one).collect()
     };

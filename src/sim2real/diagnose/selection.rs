@@ -4,7 +4,8 @@ use super::Score;
 use super::free_run::strays;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::prune::pruned;
-use super::weigh::{ABOVE_NOISE, lead, pursued};
+use super::pursue::pursued;
+use super::weigh::{ABOVE_NOISE, lead};
 use crate::sim2real::{Candidate, Twin};
 
 /// The outcome of a selection.
@@ -25,6 +26,11 @@ impl<T: Twin> Selection<T> {
     /// Whether what was selected leaves hardly more than the noise.
     pub fn complete(&self) -> bool {
         self.selected.within(ABOVE_NOISE)
+    }
+
+    /// The best set of so many mechanisms, if the selection came so far from nothing.
+    pub fn best_of_stage(&self, mechanisms: usize) -> Option<&Hypothesis<T>> {
+        self.fitted.iter().find(|fitted| fitted.added.len() == mechanisms)
     }
 
     /// What was fitted of the selected mechanisms and one more, in the order in which it did well.

@@ -1,0 +1,77 @@
+//! The search: in free run and, where a plant adds up errors, on windows that start afresh; each with steps of integration as long as they
+//! may be at first.
+
+use super::evidence::Evidence;
+use super::hypothesis::{Hypothesis, Inquiry};
+use super::rivals::{self, Place};
+use super::selection::Selection;
+use super::weigh::squares;
+use super::{Progress, free_run, gates, select};
+use crate::sim2real::Twin;
+
+/// What was found once leaves as little where it is found again, but for this part.
+const AS_BEFORE: f64 = 1.02;
+
+/// What is selected, its rivals, and whether that was on the windows of `evidence` rather than in the free run of `inquiry`.
+///
+/// Where a plant adds up errors, a free run tells most if the physics is complete, and hardly anything if it is not: windows are asked
+/// where it leaves more than noise.
+pub(super) fn searched<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    evidence: &Evidence<'_, T::Stimulus>,
+    progress: Progress<'_>,
+) -> (Selection<T>, Vec<Place>, bool) {
+    let (selection, places) = settled(inquiry, progress);
+    if evidence.window.is_none() || selection.complete() {
+        return (selection, places, false);
+    }
+    let in_windows = Inquiry { evidence, ..*inquiry };
+    let (on_windows, places_there) = settled(&in_windows, progress);
+    // What windows have found may be near enough for a free run to tell the rest.
+    let rest = may_tell_more(inquiry, &selection, &on_windows)
+        .then(|| rivals::settled(inquiry, select::resumed(inquiry, &on_windows, progress)));
+    let there = |rest: &Selection<T>| rest.complete() && free_run::bears_out((&in_windows, &on_windows), (inquiry, rest));
+    match rest.filter(|(rest, _)| there(rest)) {
+        Some((rest, places)) => (rest, places, false),
+        None if free_run::worse_than((&in_windows, &on_windows), &selection) => (selection, places, false),
+        None => (on_windows, places_there, true),
+    }
+}
+
+/// Whether a free run may tell of more than windows have found: they explained themselves, and the `selection` that was made in free run did
+/// not begin with the same, which has led where it would again.
+fn may_tell_more<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, on_windows: &Selection<T>) -> bool {
+    if !on_windows.complete() || on_windows.selected.added.is_empty() {
+        return false;
+    }
+    let began_there = |best: &&Hypothesis<T>| best.set() == on_windows.selected.set();
+    let before = selection.best_of_stage(on_windows.selected.added.len()).filter(began_there);
+    before.is_none_or(|before| squares(before) > AS_BEFORE * squares(&inquiry.refitted_afresh(&on_windows.selected)))
+}
+
+/// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.
+fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> (Selection<T>, Vec<Place>) {
+    progress("refitting the twin's own parameters", 0, 1);
+    let given: Vec<f64> = inquiry.twin.parameters().iter().map(|p| p.nominal).collect();
+    if let Some(step) = gates::exploring_step(inquiry.twin, &given, inquiry.evidence) {
+        let twin = inquiry.twin.stepping(step);
+        let coarse = Inquiry { twin: &twin, ..*inquiry };
+        let selection = select::select(&coarse, coarse.recalibrated(), progress);
+        progress("looking for rivals", 0, 1);
+        let (selection, places) = rivals::settled(&coarse, selection);
+        let best = &selection.selected;
+        let moved = gates::moved(&best.twin, &best.fit.values, inquiry.evidence, step, gates::own_step(inquiry.twin));
+        progress("fitting with the twin's own step", 0, 1);
+        let refitted = selection.refitted(inquiry);
+        if moved < gates::SETTLED && refitted.selected.added == selection.selected.added {
+            return (refitted, places);
+        }
+        let (refitted, places) = rivals::settled(inquiry, refitted);
+        if moved < gates::SETTLED || refitted.complete() {
+            return (refitted, places);
+        }
+    }
+    let selection = select::select(inquiry, inquiry.recalibrated(), progress);
+    progress("looking for rivals", 0, 1);
+    rivals::settled(inquiry, selection)
+}
