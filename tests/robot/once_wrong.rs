@@ -323,6 +323,7 @@ fn what_a_stop_is_made_of_is_no_second_effect() {
 
 /// A small delay of the command beside an end stop: an actuator's lag and a late sensor do as well, and it was dropped for that.
 #[test]
+#[ignore = "takes half a minute: `./x test --test robot -- --ignored`"]
 fn one_of_several_delays_is_there_though_nobody_can_tell_which() {
     let trial = tried(71, 37);
     let late = trial.found.iter().find(|found| found.mechanism != "end_stop").unwrap();
@@ -378,6 +379,7 @@ fn what_three_explain_more_than_two_may_be_another_form_of_the_two() {
 
 /// Friction that falls, seen beside a limit of rate only where it gives before it slides: its other forms do worse than plain friction.
 #[test]
+#[ignore = "takes half a minute: `./x test --test robot -- --ignored`"]
 fn laws_that_contain_a_name_are_asked_in_all_their_forms() {
     assert_eq!(names(&tried(79, 48)), ["rate_limit", "stribeck_friction"]);
 }
@@ -399,6 +401,7 @@ fn what_leaves_far_less_is_gone_on_from_though_it_gains_nothing() {
 /// Cogging on an axis that stays where it comes to rest: the winding's warmth shows in free run alone, and there no fit finds it but
 /// the one that windows began.
 #[test]
+#[ignore = "takes half a minute: `./x test --test robot -- --ignored`"]
 fn what_windows_fitted_for_nothing_begins_a_free_run() {
     assert_eq!(names(&tried(78, 8)), ["cogging", "thermal_derating"]);
 }
@@ -406,6 +409,7 @@ fn what_windows_fitted_for_nothing_begins_a_free_run() {
 /// Cogging alone, which windows show; followed from the start on, the axis came to the right tooth with a compliance in its drive, too,
 /// of which windows show nothing.
 #[test]
+#[ignore = "takes half a minute: `./x test --test robot -- --ignored`"]
 fn what_brings_a_free_run_to_the_right_tooth_by_chance_is_not_named() {
     assert_eq!(names(&tried(76, 7)), ["cogging"]);
 }
