@@ -46,7 +46,12 @@ fn may_tell_more<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, on
     }
     let began_there = |best: &&Hypothesis<T>| best.set() == on_windows.selected.set();
     let before = selection.best_of_stage(on_windows.selected.added.len()).filter(began_there);
-    before.is_none_or(|before| squares(before) > AS_BEFORE * squares(&inquiry.refitted_afresh(&on_windows.selected)))
+    before.is_none_or(|before| !as_good(before, &inquiry.refitted_afresh(&on_windows.selected)))
+}
+
+/// Whether a fit that was found before leaves as little as one from another beginning.
+fn as_good<T>(before: &Hypothesis<T>, again: &Hypothesis<T>) -> bool {
+    squares(before) <= AS_BEFORE * squares(again)
 }
 
 /// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.
@@ -74,4 +79,17 @@ fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> (Select
     let selection = select::select(inquiry, inquiry.recalibrated(), progress);
     progress("looking for rivals", 0, 1);
     rivals::settled(inquiry, selection)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::weigh::tests::leaving;
+    use super::*;
+
+    #[test]
+    fn a_free_run_is_searched_again_only_from_where_it_was_not_or_was_worse() {
+        let before = leaving(22.0, 60.0);
+        assert!(as_good(&before, &leaving(21.9, 60.0)) && as_good(&before, &leaving(40.0, 60.0)));
+        assert!(!as_good(&before, &leaving(3.0, 60.0)), "windows lead to another valley");
+    }
 }
