@@ -75,13 +75,13 @@ impl ProofPage {
         let (mut reached, mut wanted) = (0, 0);
         for (_, tone) in self.figures.iter().filter_map(|figure| figure.standing.as_ref()) {
             wanted += 1;
-            reached += usize::from(*tone != Tone::Bad);
+            reached += usize::from(*tone == Tone::Good);
         }
         let tone = if reached == wanted { Tone::Good } else { Tone::Unsure };
         let page = Page {
             kind: "Blind benchmark",
             heading: self.title.clone(),
-            badge: Some(Badge { text: format!("{reached} of {wanted} goals reached"), tone }),
+            badge: Some(Badge { text: format!("{reached} of {wanted} aims reached"), tone }),
             sections: vec![
                 Box::new(ProofTable { page: self }),
                 Box::new(ConfusionMatrix { table: &self.confusion }),
@@ -90,5 +90,18 @@ impl ProofPage {
             ],
         };
         page.render()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_reaches_the_least_alone_has_not_reached_its_aim() {
+        let figure = |tone| ProofFigure { standing: Some((String::new(), tone)), ..ProofFigure::default() };
+        let figures = [Tone::Good, Tone::Unsure, Tone::Bad].map(figure).to_vec();
+        let page = ProofPage { figures, ..ProofPage::default() }.render().unwrap();
+        assert!(page.contains("1 of 3 aims reached"));
     }
 }
