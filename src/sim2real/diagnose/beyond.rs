@@ -4,6 +4,8 @@
 //! is sought within what goes by its name. One that would explain more beyond that, in whatever form, is not what is missing; and if
 //! another of the registry were, that would have been found to do better.
 
+use rayon::prelude::*;
+
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::selection::Selection;
 use super::weigh::{ACCEPT, lead, squares};
@@ -22,8 +24,8 @@ pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
         true => *number == selected.added[place],
         false => other.about.name == own.about.name,
     });
-    let mut opened = forms.filter_map(|(number, form)| Opened::of(inquiry, selected, place, (number, form)));
-    opened.any(|opened| {
+    let opened: Vec<Opened> = forms.filter_map(|form| Opened::of(inquiry, selected, place, form)).collect();
+    opened.into_par_iter().any(|opened| {
         let further = opened.followed(inquiry, selected, place);
         opened.is_beyond(&further, inquiry, selected, place)
             && lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT

@@ -6,8 +6,8 @@
 //! for each the form that does best beside the others; `rivals` looks for other names, `carry_over` asks the one recording of
 //! what explains little in the other, and `confidence` says how sure one is;
 //! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out, `constancy` asks
-//! whether the same constants hold there, and `nameless` whether a curve of any shape explains more; the `decision` rests on all of it, and
-//! `verdict` and `words` tell it. `gates` says how long steps of integration may be, and `recognize` sees what needs no fit. `locate`
+//! whether the same constants hold there, and `nameless` whether a curve of any shape explains more; the `decision` rests on all of these
+//! `findings`, and `verdict` and `words` tell it. `gates` says how long steps of integration may be, and `recognize` sees what needs no fit. `locate`
 //! and `onset` say where and since when the twin is off, `activity` when what was named acted, and `experiment` designs, from the
 //! commands of `excitation`, what to record where rivals are left; `unread` asks what the twin does not read of them. Where recordings
 //! show several things that no mechanism has in common, each of these `aspects` goes through all of it by itself.
@@ -28,6 +28,7 @@ mod evidence;
 mod exact;
 mod excitation;
 mod experiment;
+mod findings;
 mod forms;
 mod free_run;
 mod gates;
@@ -80,8 +81,7 @@ use hypothesis::Inquiry;
 use prove::Contest;
 
 use super::any_twin::{AnyStimulus, AnyTwin, any_recordings};
-use super::{Candidate, ChannelWeight, Clock, Parameter, Recording, Seed, Signs, Simulator, Twin};
-use crate::sim2real::identify::Fit;
+use super::{Candidate, ChannelWeight, Clock, Recording, Seed, Signs, Simulator, Twin};
 
 /// Told of each step: what is done, and how many steps of how many lie behind it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
@@ -287,8 +287,8 @@ fn as_stamped(
     let selection = recognize::finished(&inquiry, selection, &mut rivals);
     let asked_for = record::asked_for(&inquiry, &selection.selected, recordings);
     progress("proving on held-out data", 0, 1);
-    let recalibrated = inquiry.in_free_run(&selection.recalibrated);
-    let trued = inquiry.in_free_run(&selection.selected);
+    let in_free_run = |hypothesis| inquiry.in_free_run(hypothesis);
+    let (recalibrated, trued) = rayon::join(|| in_free_run(&selection.recalibrated), || in_free_run(&selection.selected));
     let given: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).collect();
     let contest = Contest {
         nominal: (twin, &given),
@@ -296,35 +296,8 @@ fn as_stamped(
         trued: (&selection.selected.twin, &trued.values),
     };
     let comparisons = prove::compared(&contest, inquiry.evidence, seed);
-    let known = shown(&trued, selection.selected.twin.parameters());
     let covariates = locate::covariates(&inquiry);
-    let of_no_law = no_law::explains_more(&inquiry, &selection, &covariates);
-    let left_by = if of_no_law { &selection.recalibrated } else { &selection.selected };
-    let depends = remainder::dependences(&inquiry, left_by, &covariates);
-    let fits = prove::channel_fits(&comparisons, &noise_of(&inquiry, &selection.selected), seed);
-    let std = uncertainty::inflated(&inquiry, &selection.selected, &trued);
-    let refuted = decision::refuted(&inquiry, &selection, &fits, &covariates);
-    let findings = decision::Findings {
-        placebo_p: prove::placebo(&inquiry, &selection.without, &selection.selected),
-        // Of what is refuted nothing was explained.
-        remainder: if refuted || of_no_law { 1.0 } else { remainder::remainder(&inquiry, &selection, &depends) },
-        refuted,
-        of_no_law,
-        // What recordings have of their own, as what orders foresaw, may be what the fitted ones tell of.
-        few_tell: decision::few_tell(&comparisons) && trued.state.values.iter().all(Vec::is_empty),
-        contradiction: decision::contradiction(&inquiry, &selection.selected, &comparisons),
-        followed: remainder::followed(&trued, &selection.selected),
-        dependence: remainder::strongest(&depends),
-        foretold: remainder::foretold(&inquiry, &selection.selected),
-        belied: constancy::changed(&inquiry, &selection.selected, (&trued, &std), &fits)
-            .or_else(|| nameless::beats(&inquiry, &selection, recordings, &fits)),
-        fits,
-        std,
-        trued: known.clone(),
-        sampled: twin.clock() != Clock::Event,
-        inexact: exact::inexact(&inquiry, &selection),
-        beyond: beyond::goes_on(&inquiry, &selection),
-    };
+    let findings = findings::findings(&inquiry, &selection, recordings, (&comparisons, &trued), &covariates);
     let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
     // What the fit has named already need not be recognized besides.
     let named: Vec<&str> = selection.selected.added.iter().map(|number| candidates[*number].about.name).collect();
@@ -348,7 +321,8 @@ fn as_stamped(
     let facts = verdict::facts(&inquiry, &findings);
     let mut added: Vec<Candidate> = selection.selected.added.iter().map(|number| candidates[*number].clone()).collect();
     let mut correlation = trued.correlation(selection.selected.twin.parameters());
-    let (mut trued_twin, mut values, mut std) = (selection.selected.twin.rounding(true), known.values, findings.std);
+    let (mut trued_twin, mut values, mut std) =
+        (selection.selected.twin.rounding(true), findings.trued.values, findings.std);
     for candidate in seen {
         trued_twin = trued_twin.with(candidate);
         values.extend(candidate.form.parameters.iter().map(|p| p.nominal));
@@ -361,17 +335,6 @@ fn as_stamped(
     (fitted..values.len()).for_each(|k| correlation[(k, k)] = 1.0);
     let outcome = Outcome { diagnosis, trued: trued_twin, values, std, correlation, comparisons, profiles, excitation };
     (Answered { outcome, added, facts }, asked_for)
-}
-
-/// The fit with what recordings show by themselves of its parameters. What they leave unexplained is told of the fit: to follow what was
-/// recorded it may need another value than the usual one, which whatever is simulated next is to have.
-fn shown(fit: &Fit, parameters: &[Parameter]) -> Fit {
-    let mut known = fit.clone();
-    for (k, [value, _]) in parameters.iter().enumerate().filter_map(|(k, p)| Some((k, p.shown?))) {
-        known.values[k] = value;
-        known.at_bound.retain(|at| *at != k);
-    }
-    known
 }
 
 /// Refits the parameters that `twin` has, and adds nothing.

@@ -7,6 +7,8 @@
 //! Source: Armstrong-Hélouvry, Dupont & Canudas de Wit, "A survey of models, analysis tools and compensation methods for the control of
 //! machines with friction", Automatica 30 (1994): friction as a map of velocity that is found before a law is.
 
+use rayon::prelude::*;
+
 use super::carry_over::best_begun;
 use super::diagnosis::ChannelFit;
 use super::hypothesis::{Hypothesis, Inquiry};
@@ -39,7 +41,7 @@ pub(super) fn beats(
     }
     let name = |place: usize| inquiry.candidates[selected.added[place]].about.name;
     let left = left_elsewhere(inquiry, selected);
-    inquiry.twin.nameless(recordings).into_iter().find_map(|curve| {
+    inquiry.twin.nameless(recordings).into_par_iter().find_map_first(|curve| {
         let place = (0..selected.added.len()).find(|place| {
             if curve.about.contains.contains(&name(*place)) {
                 return false;

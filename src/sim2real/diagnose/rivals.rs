@@ -152,7 +152,7 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
     let selected = &selection.selected;
     selected
         .added
-        .iter()
+        .par_iter()
         .zip(&selection.without)
         .enumerate()
         .map(|(place, (own, less))| {

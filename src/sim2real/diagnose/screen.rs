@@ -44,11 +44,11 @@ pub(super) fn signatures<T: Twin>(
     parent: &Hypothesis<T>,
     wanted: impl Fn(&Candidate) -> bool + Sync,
 ) -> Vec<Screened> {
-    let mut grounds = vec![Ground::new(inquiry, parent, &parent.fit.values)];
+    let mut stands = vec![parent.fit.values.clone()];
     if parent.added.is_empty() && parent.misfits.iter().any(|m| m.sum_of_squares > BENT * m.count as f64) {
-        let given: Vec<f64> = parent.twin.parameters().iter().map(|p| p.nominal).collect();
-        grounds.push(Ground::new(inquiry, parent, &given));
+        stands.push(parent.twin.parameters().iter().map(|p| p.nominal).collect());
     }
+    let grounds: Vec<Ground> = stands.par_iter().map(|values| Ground::new(inquiry, parent, values)).collect();
     let has: Vec<&str> = parent.added.iter().map(|n| inquiry.candidates[*n].about.name).collect();
     let (wider, plain): (Vec<usize>, Vec<usize>) = (0..inquiry.candidates.len())
         .filter(|number| !inquiry.candidates[*number].finishing && wanted(&inquiry.candidates[*number]))

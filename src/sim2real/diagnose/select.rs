@@ -116,10 +116,10 @@ fn selected_from<T: Twin>(
 /// What is found beside `selection` as another inquiry follows the recordings. What was of no use beside it so far may do much there, and a
 /// fit finds it that begins from where it stood.
 pub(super) fn resumed<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, progress: Progress<'_>) -> Selection<T> {
-    let start = inquiry.refitted_afresh(&selection.selected);
-    let recalibrated = inquiry.refitted_afresh(&selection.recalibrated);
+    let refitted = |hypothesis| inquiry.refitted_afresh(hypothesis);
+    let both = || rayon::join(|| refitted(&selection.selected), || refitted(&selection.recalibrated));
     let known: Vec<&Hypothesis<T>> = selection.beside(inquiry).take(KNOWN).collect();
-    let known = known.into_par_iter().map(|more| inquiry.refitted_afresh(more)).collect();
+    let ((start, recalibrated), known) = rayon::join(both, || known.into_par_iter().map(refitted).collect());
     let found = selected_from(inquiry, recalibrated, Some(start), known, progress);
     let scores = selection.scores.iter().cloned().chain(found.scores).collect();
     Selection { scores, ..found }
@@ -171,13 +171,13 @@ fn expand<T: Twin>(
     beam: &[Hypothesis<T>],
     stage: usize,
 ) -> (Vec<Hypothesis<T>>, Vec<Score>) {
-    let mut jobs: Vec<Job> = Vec::new();
-    for (place, parent) in beam.iter().enumerate() {
+    let beside = |(place, parent): (usize, &Hypothesis<T>)| -> Vec<Job> {
         let mut screened = inquiry.screened(parent);
         screened.sort_by(|a, b| b.score.total_cmp(&a.score));
         let chosen = chosen(inquiry, first, parent, &screened, place);
-        jobs.extend(screened.into_iter().zip(chosen).map(|(screened, starts)| Job { place, screened, starts }));
-    }
+        screened.into_iter().zip(chosen).map(|(screened, starts)| Job { place, screened, starts }).collect()
+    };
+    let mut jobs: Vec<Job> = beam.par_iter().enumerate().flat_map_iter(beside).collect();
     once(beam, &mut jobs);
     let fit = |starts: &[usize]| -> Vec<Option<Hypothesis<T>>> {
         let one = |(Job { place, screened, .. }, starts): (&Job, &usize)| {

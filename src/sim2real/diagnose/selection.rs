@@ -67,9 +67,9 @@ impl<T: Twin> Selection<T> {
 
     /// The same selection fitted with another inquiry's step of integration, and what is no longer needed left out.
     pub fn refitted(&self, inquiry: &Inquiry<'_, T>) -> Self {
-        let recalibrated = inquiry.refitted(&self.recalibrated);
-        let whole = if self.selected.added.is_empty() { Vec::new() } else { vec![inquiry.refitted(&self.selected)] };
-        self.with_set(pruned(inquiry, &recalibrated, whole))
+        let whole = || (!self.selected.added.is_empty()).then(|| inquiry.refitted(&self.selected));
+        let (recalibrated, whole) = rayon::join(|| inquiry.refitted(&self.recalibrated), whole);
+        self.with_set(pruned(inquiry, &recalibrated, Vec::from_iter(whole)))
     }
 
     /// This selection, nothing of it fitted anew, as another inquiry sees it.
