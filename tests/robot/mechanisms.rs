@@ -49,6 +49,11 @@ fn plain(x: State, u: f64, push: f64) -> Forces {
     Forces { net: u - VISCOUS * x[1] - GRAVITY * x[0].sin() + push, inertia: INERTIA, ..Forces::default() }
 }
 
+/// The arm with `more` of its inertia, which changes by `slope` of it a radian.
+fn shaped(x: State, u: f64, more: f64, slope: f64) -> Forces {
+    Forces { inertia: INERTIA * (1.0 + more), ..plain(x, u, -0.5 * INERTIA * slope * x[1] * x[1]) }
+}
+
 /// The arm with dry friction of `dry` [N m].
 fn rubbing(x: State, u: f64, dry: f64) -> Forces {
     Forces { dry, ..plain(x, u, 0.0) }
@@ -249,13 +254,25 @@ const CASES: &[Case] = &[
     Case {
         mechanism: "velocity_curve",
         form: "",
-        values: &[-0.4, -0.05, 0.1, 0.2, 3.0],
+        values: &[-0.4, -0.05, -0.0075, 0.015, 0.1, 0.2, 3.0],
         law: |_, x, u| {
             let [v, steep, flat] = [x[1], (0.4 - 0.05) / 2.0, (0.2 - 0.1) / 2.0];
             let below = if v < -1.0 { -0.05 + steep * (v + 1.0) } else { 0.05 * v };
             plain(x, u, -if v < 0.0 { below } else { 0.1 * v.min(1.0) + flat * (v - 1.0).max(0.0) })
         },
         most: 1e-4,
+    },
+    Case {
+        mechanism: "inertia_curve",
+        form: "turn",
+        values: &[0.2, -0.1, 0.05, 0.15],
+        law: |_, x, u| {
+            let (s, c, s2, c2) = (x[0].sin(), x[0].cos(), (2.0 * x[0]).sin(), (2.0 * x[0]).cos());
+            let more = 0.2 * s - 0.1 * c + 0.05 * s2 + 0.15 * c2;
+            let slope = 0.2 * c + 0.1 * s + 2.0 * (0.05 * c2 - 0.15 * s2);
+            shaped(x, u, more, slope)
+        },
+        most: 2e-5,
     },
     Case { mechanism: "stiffness", form: "straight", values: &[1.5], law: |_, x, u| plain(x, u, -1.5 * x[0]), most: 2e-5 },
     Case {

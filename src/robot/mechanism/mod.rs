@@ -9,6 +9,7 @@ mod cubic_stiffness;
 mod drawn;
 mod end_stop;
 mod hysteresis;
+mod inertia_curve;
 mod load_friction;
 mod overflow;
 mod payload_change;
@@ -29,6 +30,7 @@ pub use coulomb_friction::CoulombFriction;
 pub use cubic_stiffness::CubicStiffness;
 pub use end_stop::EndStop;
 pub use hysteresis::Hysteresis;
+pub use inertia_curve::InertiaCurve;
 pub use load_friction::LoadFriction;
 pub use overflow::Overflow;
 pub use payload_change::PayloadChange;
@@ -62,7 +64,8 @@ macro_rules! rows {
             signals, delays $delays, lags $lags, rates $rates,
             plant [
                 &Backlash, &ConstantLoad, &CoulombFriction, &StribeckFriction, &LoadFriction, &QuadraticDrag, &Stiffness,
-                &CubicStiffness, &Cogging, &PayloadChange, &EndStop, &Compliance, &Hysteresis, &VelocityCurve
+                &CubicStiffness, &Cogging, &PayloadChange, &EndStop, &Compliance, &Hysteresis, &VelocityCurve,
+                &InertiaCurve
             ],
             sensor [
                 &Rectification { rate: rate_of_the_first($rates) }, &Eccentricity { rate: rate_of_the_first($rates) }

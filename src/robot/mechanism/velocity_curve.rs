@@ -3,8 +3,8 @@
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
-/// `-torque(v)`, a line through `far_below` at `-reach`, `below` at `-reach / 3`, 0 at rest, `above` at `reach / 3` and `far_above` at
-/// `reach`, which goes on straight beyond.
+/// `-torque(v)`, a line through `far_below` at `-reach`, `below` at `-reach / 3`, `just_below` at `-reach / 20`, 0 at rest, `just_above` at
+/// `reach / 20`, `above` at `reach / 3` and `far_above` at `reach`, which goes on straight beyond: steep about rest, as dry friction is.
 ///
 /// It is no law and stands for none, and so no diagnosis names it; a twin may have it as the table of a friction that was measured.
 ///
@@ -14,7 +14,7 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 pub struct VelocityCurve;
 
 /// Where the line is bent, in units of its reach: at rest it is 0.
-const KNOTS: [f64; 5] = [-1.0, -1.0 / 3.0, 0.0, 1.0 / 3.0, 1.0];
+const KNOTS: [f64; 7] = [-1.0, -1.0 / 3.0, -0.05, 0.0, 0.05, 1.0 / 3.0, 1.0];
 
 impl<P: Mover> Mechanism<P> for VelocityCurve {
     fn about(&self) -> About {
@@ -22,7 +22,7 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
             name: "velocity_curve",
             site: Site::Plant,
             title: "an effort that goes with the velocity",
-            law: "inertia a = ... - torque(v), a line through five points",
+            law: "inertia a = ... - torque(v), a line through seven points",
             source: "Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), 2",
             remedy: "measure the effort that it takes to move at a constant velocity, in both directions",
             // Of those that depend on load or on the past besides, most of what they do.
@@ -35,7 +35,8 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
         let torque = |name| Parameter::new(name, "N m", 0.0).starting_at(&starts).proportional();
         let rate = typical.rate.max(1e-9);
         let reach = Parameter::new("reach", "rad/s", rate).within(1e-9 * rate.min(1.0), f64::INFINITY).known_to(0.0);
-        Form::only(vec![torque("far_below"), torque("below"), torque("above"), torque("far_above"), reach])
+        let efforts = ["far_below", "below", "just_below", "just_above", "above", "far_above"].map(torque);
+        Form::only(efforts.into_iter().chain([reach]).collect())
     }
 
     fn nameless(&self) -> bool {
@@ -43,7 +44,7 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        let curve = |lane: usize| Curve::through([0, 1, 2, 3, 4].map(|k| thetas.row(k)[lane]));
+        let curve = |lane: usize| Curve::through(std::array::from_fn(|k| thetas.row(k)[lane]));
         Box::new(Curves((0..thetas.lanes()).map(curve).collect()))
     }
 }
@@ -52,20 +53,20 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Curve {
     /// Efforts at the knots [N m].
-    efforts: [f64; 5],
+    efforts: [f64; 7],
     /// The velocity at which the last of them is met [rad/s].
     reach: f64,
 }
 
 impl Curve {
-    fn through([far_below, below, above, far_above, reach]: [f64; 5]) -> Self {
-        Self { efforts: [far_below, below, 0.0, above, far_above], reach }
+    fn through([far_below, below, just_below, just_above, above, far_above, reach]: [f64; 7]) -> Self {
+        Self { efforts: [far_below, below, just_below, 0.0, just_above, above, far_above], reach }
     }
 
     /// The effort at `velocity`, and how it changes with that.
     fn at(&self, velocity: f64) -> (f64, f64) {
         let x = velocity / self.reach;
-        let piece = KNOTS[1..4].iter().filter(|knot| x >= **knot).count();
+        let piece = KNOTS[1..6].iter().filter(|knot| x >= **knot).count();
         let slope = (self.efforts[piece + 1] - self.efforts[piece]) / (KNOTS[piece + 1] - KNOTS[piece]);
         (self.efforts[piece] + slope * (x - KNOTS[piece]), slope / self.reach)
     }
@@ -76,7 +77,7 @@ struct Curves(Vec<Curve>);
 
 impl<P: Mover> Law<P> for Curves {
     fn change(&mut self, change: &LaneChange<'_>) {
-        change.derived(&mut self.0, |values| Curve::through([0, 1, 2, 3, 4].map(|k| values[k])));
+        change.derived(&mut self.0, |values| Curve::through(std::array::from_fn(|k| values[k])));
     }
 
     fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
@@ -98,9 +99,9 @@ mod tests {
 
     #[test]
     fn it_goes_through_its_points_and_on() {
-        let curve = Curve::through([-4.0, -1.0, 0.5, 3.0, 6.0]);
+        let curve = Curve::through([-4.0, -1.0, -0.6, 0.3, 0.5, 3.0, 6.0]);
         let points =
-            [(-8.0, -5.5), (-6.0, -4.0), (-2.0, -1.0), (-1.0, -0.5), (0.0, 0.0), (2.0, 0.5), (4.0, 1.75), (6.0, 3.0)];
+            [(-8.0, -5.5), (-6.0, -4.0), (-2.0, -1.0), (-0.3, -0.6), (0.0, 0.0), (0.15, 0.15), (0.3, 0.3), (2.0, 0.5), (4.0, 1.75)];
         for (velocity, effort) in points {
             assert!((curve.at(velocity).0 - effort).abs() < 1e-12, "{velocity}: {}", curve.at(velocity).0);
         }
@@ -111,7 +112,7 @@ mod tests {
     fn one_direction_may_be_braked_alone() {
         for (velocity, expected) in [(1.5, 1.5 * (-2.0_f64).exp()), (-1.5, -1.5)] {
             let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.0, velocity, step: 1e-3 };
-            let motion = trial.follow(&VelocityCurve, 0, &[0.0, 0.0, 0.2, 0.6, 3.0], &[0.0; 1_001]);
+            let motion = trial.follow(&VelocityCurve, 0, &[0.0, 0.0, 0.0, 0.03, 0.2, 0.6, 3.0], &[0.0; 1_001]);
             assert!((motion[1_000].velocity - expected).abs() < 1e-5, "{} not {expected}", motion[1_000].velocity);
         }
     }

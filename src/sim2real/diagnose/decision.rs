@@ -29,7 +29,7 @@ pub(super) const ABOVE_THE_NOISE: f64 = 2.0;
 const SLOW: f64 = 5.0;
 const SLOWLY_ABOVE: f64 = 1.3;
 /// Beside what was named that counts from this many times the noise on: it was fitted to leave as little as it can.
-const SLOWLY_LEFT: f64 = 1.1;
+pub(super) const SLOWLY_LEFT: f64 = 1.1;
 /// What a regression foretells counts where the mean squared residual is more than this many times the noise.
 const HARDLY_ABOVE: f64 = 1.2;
 /// Noise does not grow from one recording to another: a mean squared residual this many times that of the fitted rows is something else, ...
@@ -250,7 +250,7 @@ fn better(fits: &[ChannelFit]) -> bool {
 }
 
 /// Whether more than so many times the noise is left of a channel, and slower than noise.
-fn slowly_above<T>(selected: &Hypothesis<T>, times: f64) -> bool {
+pub(super) fn slowly_above<T>(selected: &Hypothesis<T>, times: f64) -> bool {
     selected.misfits.iter().any(|m| !m.within(times, m.level) && m.autocorrelation_time > SLOW)
 }
 

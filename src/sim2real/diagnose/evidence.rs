@@ -112,6 +112,14 @@ impl<'a, S: Send + Sync> Evidence<'a, S> {
         self.weights.iter().position(|w| w.channel == channel).map_or(0.0, |k| self.rounding[k])
     }
 
+    /// What is held out, divided as what is compared.
+    pub(super) fn held_out_as_compared(&self) -> Vec<Part<'a, S>> {
+        match self.window {
+            Some(seconds) => self.held_out.iter().flat_map(|part| part.windows(seconds)).collect(),
+            None => self.held_out.clone(),
+        }
+    }
+
     /// The initial states with which parts are compared: windows start wherever fits best.
     pub(super) fn initial_state<T: Simulator<Stimulus = S>>(&self, problem: &Problem<'_, T>) -> State {
         if self.window.is_some() || self.sparse { State::unknown(problem) } else { State::estimated(problem) }

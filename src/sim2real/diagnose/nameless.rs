@@ -15,7 +15,7 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::selection::Selection;
 use super::weigh;
 use crate::sim2real::any_twin::{AnyStimulus, AnyTwin};
-use crate::sim2real::identify::{Effort, State};
+use crate::sim2real::identify::Effort;
 use crate::sim2real::{Candidate, Clock, Recording, Simulator, Twin};
 
 /// What was named is asked where it leaves more than this many times the noise of held-out signals.
@@ -34,13 +34,17 @@ pub(super) fn beats(
     fits: &[ChannelFit],
 ) -> Option<String> {
     let off = |fit: &ChannelFit| fit.trued_rmse.powi(2) > LEAVES * fit.noise_floor.powi(2);
-    let asked = inquiry.twin.clock() != Clock::Event && inquiry.evidence.window.is_none() && !inquiry.evidence.sparse;
+    let asked = inquiry.twin.clock() != Clock::Event && !inquiry.evidence.sparse;
     let selected = &selection.selected;
     if !asked || selected.added.is_empty() || !fits.iter().any(off) {
         return None;
     }
     let name = |place: usize| inquiry.candidates[selected.added[place]].about.name;
     let left = left_elsewhere(inquiry, selected);
+    // Of windows it is these that must be off: a free run adds up what is next to nothing in each.
+    if inquiry.evidence.window.is_some() && left <= LEAVES {
+        return None;
+    }
     inquiry.twin.nameless(recordings).into_par_iter().find_map_first(|curve| {
         let place = (0..selected.added.len()).find(|place| {
             if curve.about.contains.contains(&name(*place)) {
@@ -60,8 +64,10 @@ fn instead(inquiry: &Inquiry<'_, AnyTwin>, less: &Hypothesis<AnyTwin>, curve: &C
     inquiry.begun(less.twin.with(curve), less.added.clone(), &values, Some(&less.fit.state), Effort::Thorough)
 }
 
-/// The mean square that `hypothesis` leaves of what is held out, in units of the noise, begun from where it is least.
+/// The mean square that `hypothesis` leaves of what is held out, in units of the noise, begun from where it is least: on windows where it
+/// was fitted on windows.
 fn left_elsewhere(inquiry: &Inquiry<'_, AnyTwin>, hypothesis: &Hypothesis<AnyTwin>) -> f64 {
-    let problem = inquiry.problem(&hypothesis.twin, &inquiry.evidence.held_out);
-    best_begun(&problem, &hypothesis.fit.values, State::estimated(&problem))
+    let parts = inquiry.evidence.held_out_as_compared();
+    let problem = inquiry.problem(&hypothesis.twin, &parts);
+    best_begun(&problem, &hypothesis.fit.values, inquiry.evidence.initial_state(&problem))
 }

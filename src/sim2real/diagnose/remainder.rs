@@ -116,10 +116,7 @@ pub(super) fn foretold<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<
     if inquiry.twin.clock() == Clock::Event {
         return 0.0;
     }
-    let held_out: Vec<Part<'_, T::Stimulus>> = match inquiry.evidence.window {
-        Some(seconds) => inquiry.evidence.held_out.iter().flat_map(|p| p.windows(seconds)).collect(),
-        None => inquiry.evidence.held_out.clone(),
-    };
+    let held_out = inquiry.evidence.held_out_as_compared();
     let mut simulated: BTreeMap<usize, Simulated<'_, T::Stimulus>> = BTreeMap::new();
     for Part { recording, .. } in inquiry.evidence.free_run.iter().chain(&inquiry.evidence.held_out) {
         simulated.entry(identity(recording)).or_insert_with(|| (recording, recording.measured.clone()));

@@ -1,6 +1,7 @@
 //! The search: in free run and, where a plant adds up errors, on windows that start afresh; each with steps of integration as long as they
 //! may be at first.
 
+use super::decision::{SLOWLY_LEFT, slowly_above};
 use super::evidence::Evidence;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::{self, Place};
@@ -22,7 +23,9 @@ pub(super) fn searched<T: Twin>(
     progress: Progress<'_>,
 ) -> (Selection<T>, Vec<Place>, bool) {
     let (selection, places) = settled(inquiry, progress);
-    if evidence.window.is_none() || selection.complete() {
+    // What is slower than noise would be told to be unexplained.
+    let explained = selection.complete() && !slowly_above(&selection.selected, SLOWLY_LEFT);
+    if evidence.window.is_none() || explained {
         return (selection, places, false);
     }
     let in_windows = Inquiry { evidence, ..*inquiry };
