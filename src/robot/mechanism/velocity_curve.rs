@@ -6,6 +6,8 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 /// `-torque(v)`, a line through `far_below` at `-reach`, `below` at `-reach / 3`, `just_below` at `-reach / 20`, 0 at rest, `just_above` at
 /// `reach / 20`, `above` at `reach / 3` and `far_above` at `reach`, which goes on straight beyond: steep about rest, as dry friction is.
 ///
+/// In the form `by_direction` it is dry friction of `above` where the motion is upwards, and of `below` where it is downwards.
+///
 /// It is no law and stands for none, and so no diagnosis names it; a twin may have it as the table of a friction that was measured.
 ///
 /// Source: friction as a static map of velocity, Armstrong-Hélouvry, Dupont & Canudas de Wit, "A survey of models, analysis tools and
@@ -36,14 +38,20 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
         let rate = typical.rate.max(1e-9);
         let reach = Parameter::new("reach", "rad/s", rate).within(1e-9 * rate.min(1.0), f64::INFINITY).known_to(0.0);
         let efforts = ["far_below", "below", "just_below", "just_above", "above", "far_above"].map(torque);
-        Form::only(efforts.into_iter().chain([reach]).collect())
+        vec![
+            Form { name: "through_points", parameters: efforts.into_iter().chain([reach]).collect() },
+            Form { name: "by_direction", parameters: ["below", "above"].map(torque).to_vec() },
+        ]
     }
 
     fn nameless(&self) -> bool {
         true
     }
 
-    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        if form == 1 {
+            return Box::new(ByDirection { below: thetas.row(0).to_vec(), above: thetas.row(1).to_vec() });
+        }
         let curve = |lane: usize| Curve::through(std::array::from_fn(|k| thetas.row(k)[lane]));
         Box::new(Curves((0..thetas.lanes()).map(curve).collect()))
     }
@@ -92,6 +100,29 @@ impl<P: Mover> Law<P> for Curves {
     }
 }
 
+/// Dry friction of each direction.
+#[derive(Clone)]
+struct ByDirection {
+    below: Vec<f64>,
+    above: Vec<f64>,
+}
+
+impl<P: Mover> Law<P> for ByDirection {
+    fn change(&mut self, change: &LaneChange<'_>) {
+        change.parameter(0, &mut self.below);
+        change.parameter(1, &mut self.above);
+    }
+
+    fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
+        for ((effect, below), above) in effects.iter_mut().zip(&self.below).zip(&self.above) {
+            let push = P::push(effect);
+            // As much of either direction as they have in common, and half of what they differ by in one way.
+            push.dry_friction += (0.5 * (below + above)).max(0.0);
+            push.effort += 0.5 * (below - above);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,8 +131,17 @@ mod tests {
     #[test]
     fn it_goes_through_its_points_and_on() {
         let curve = Curve::through([-4.0, -1.0, -0.6, 0.3, 0.5, 3.0, 6.0]);
-        let points =
-            [(-8.0, -5.5), (-6.0, -4.0), (-2.0, -1.0), (-0.3, -0.6), (0.0, 0.0), (0.15, 0.15), (0.3, 0.3), (2.0, 0.5), (4.0, 1.75)];
+        let points = [
+            (-8.0, -5.5),
+            (-6.0, -4.0),
+            (-2.0, -1.0),
+            (-0.3, -0.6),
+            (0.0, 0.0),
+            (0.15, 0.15),
+            (0.3, 0.3),
+            (2.0, 0.5),
+            (4.0, 1.75),
+        ];
         for (velocity, effort) in points {
             assert!((curve.at(velocity).0 - effort).abs() < 1e-12, "{velocity}: {}", curve.at(velocity).0);
         }
