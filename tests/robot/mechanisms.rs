@@ -253,20 +253,13 @@ const CASES: &[Case] = &[
     },
     Case {
         mechanism: "velocity_curve",
-        form: "through_points",
-        values: &[-0.4, -0.05, -0.0075, 0.015, 0.1, 0.2, 3.0],
+        form: "",
+        values: &[-0.4, -0.05, 0.1, 0.2, 3.0],
         law: |_, x, u| {
             let [v, steep, flat] = [x[1], (0.4 - 0.05) / 2.0, (0.2 - 0.1) / 2.0];
             let below = if v < -1.0 { -0.05 + steep * (v + 1.0) } else { 0.05 * v };
             plain(x, u, -if v < 0.0 { below } else { 0.1 * v.min(1.0) + flat * (v - 1.0).max(0.0) })
         },
-        most: 1e-4,
-    },
-    Case {
-        mechanism: "velocity_curve",
-        form: "by_direction",
-        values: &[0.1, 0.3],
-        law: |_, x, u| Forces { dry: 0.2, ..plain(x, u, -0.1) },
         most: 1e-4,
     },
     Case {

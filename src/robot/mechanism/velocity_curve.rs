@@ -3,10 +3,8 @@
 use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
-/// `-torque(v)`, a line through `far_below` at `-reach`, `below` at `-reach / 3`, `just_below` at `-reach / 20`, 0 at rest, `just_above` at
-/// `reach / 20`, `above` at `reach / 3` and `far_above` at `reach`, which goes on straight beyond: steep about rest, as dry friction is.
-///
-/// In the form `by_direction` it is dry friction of `above` where the motion is upwards, and of `below` where it is downwards.
+/// `-torque(v)`, a line through `far_below` at `-reach`, `below` at `-reach / 3`, 0 at rest, `above` at `reach / 3` and `far_above` at
+/// `reach`, which goes on straight beyond.
 ///
 /// It is no law and stands for none, and so no diagnosis names it; a twin may have it as the table of a friction that was measured.
 ///
@@ -16,7 +14,7 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene,
 pub struct VelocityCurve;
 
 /// Where the line is bent, in units of its reach: at rest it is 0.
-const KNOTS: [f64; 7] = [-1.0, -1.0 / 3.0, -0.05, 0.0, 0.05, 1.0 / 3.0, 1.0];
+const KNOTS: [f64; 5] = [-1.0, -1.0 / 3.0, 0.0, 1.0 / 3.0, 1.0];
 
 impl<P: Mover> Mechanism<P> for VelocityCurve {
     fn about(&self) -> About {
@@ -24,7 +22,7 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
             name: "velocity_curve",
             site: Site::Plant,
             title: "an effort that goes with the velocity",
-            law: "inertia a = ... - torque(v), a line through seven points",
+            law: "inertia a = ... - torque(v), a line through five points",
             source: "Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), 2",
             remedy: "measure the effort that it takes to move at a constant velocity, in both directions",
             // Of those that depend on load or on the past besides, most of what they do.
@@ -37,22 +35,15 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
         let torque = |name| Parameter::new(name, "N m", 0.0).starting_at(&starts).proportional();
         let rate = typical.rate.max(1e-9);
         let reach = Parameter::new("reach", "rad/s", rate).within(1e-9 * rate.min(1.0), f64::INFINITY).known_to(0.0);
-        let efforts = ["far_below", "below", "just_below", "just_above", "above", "far_above"].map(torque);
-        vec![
-            Form { name: "through_points", parameters: efforts.into_iter().chain([reach]).collect() },
-            Form { name: "by_direction", parameters: ["below", "above"].map(torque).to_vec() },
-        ]
+        Form::only(vec![torque("far_below"), torque("below"), torque("above"), torque("far_above"), reach])
     }
 
     fn nameless(&self) -> bool {
         true
     }
 
-    fn law(&self, form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
-        if form == 1 {
-            return Box::new(ByDirection { below: thetas.row(0).to_vec(), above: thetas.row(1).to_vec() });
-        }
-        let curve = |lane: usize| Curve::through(std::array::from_fn(|k| thetas.row(k)[lane]));
+    fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {
+        let curve = |lane: usize| Curve::through([0, 1, 2, 3, 4].map(|k| thetas.row(k)[lane]));
         Box::new(Curves((0..thetas.lanes()).map(curve).collect()))
     }
 }
@@ -61,20 +52,20 @@ impl<P: Mover> Mechanism<P> for VelocityCurve {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Curve {
     /// Efforts at the knots [N m].
-    efforts: [f64; 7],
+    efforts: [f64; 5],
     /// The velocity at which the last of them is met [rad/s].
     reach: f64,
 }
 
 impl Curve {
-    fn through([far_below, below, just_below, just_above, above, far_above, reach]: [f64; 7]) -> Self {
-        Self { efforts: [far_below, below, just_below, 0.0, just_above, above, far_above], reach }
+    fn through([far_below, below, above, far_above, reach]: [f64; 5]) -> Self {
+        Self { efforts: [far_below, below, 0.0, above, far_above], reach }
     }
 
     /// The effort at `velocity`, and how it changes with that.
     fn at(&self, velocity: f64) -> (f64, f64) {
         let x = velocity / self.reach;
-        let piece = KNOTS[1..6].iter().filter(|knot| x >= **knot).count();
+        let piece = KNOTS[1..4].iter().filter(|knot| x >= **knot).count();
         let slope = (self.efforts[piece + 1] - self.efforts[piece]) / (KNOTS[piece + 1] - KNOTS[piece]);
         (self.efforts[piece] + slope * (x - KNOTS[piece]), slope / self.reach)
     }
@@ -85,7 +76,7 @@ struct Curves(Vec<Curve>);
 
 impl<P: Mover> Law<P> for Curves {
     fn change(&mut self, change: &LaneChange<'_>) {
-        change.derived(&mut self.0, |values| Curve::through(std::array::from_fn(|k| values[k])));
+        change.derived(&mut self.0, |values| Curve::through([0, 1, 2, 3, 4].map(|k| values[k])));
     }
 
     fn act(&mut self, _: Tick, scene: &Scene<'_, P>, effects: &mut [P::Effect]) {
@@ -100,29 +91,6 @@ impl<P: Mover> Law<P> for Curves {
     }
 }
 
-/// Dry friction of each direction.
-#[derive(Clone)]
-struct ByDirection {
-    below: Vec<f64>,
-    above: Vec<f64>,
-}
-
-impl<P: Mover> Law<P> for ByDirection {
-    fn change(&mut self, change: &LaneChange<'_>) {
-        change.parameter(0, &mut self.below);
-        change.parameter(1, &mut self.above);
-    }
-
-    fn act(&mut self, _: Tick, _: &Scene<'_, P>, effects: &mut [P::Effect]) {
-        for ((effect, below), above) in effects.iter_mut().zip(&self.below).zip(&self.above) {
-            let push = P::push(effect);
-            // As much of either direction as they have in common, and half of what they differ by in one way.
-            push.dry_friction += (0.5 * (below + above)).max(0.0);
-            push.effort += 0.5 * (below - above);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,18 +98,9 @@ mod tests {
 
     #[test]
     fn it_goes_through_its_points_and_on() {
-        let curve = Curve::through([-4.0, -1.0, -0.6, 0.3, 0.5, 3.0, 6.0]);
-        let points = [
-            (-8.0, -5.5),
-            (-6.0, -4.0),
-            (-2.0, -1.0),
-            (-0.3, -0.6),
-            (0.0, 0.0),
-            (0.15, 0.15),
-            (0.3, 0.3),
-            (2.0, 0.5),
-            (4.0, 1.75),
-        ];
+        let curve = Curve::through([-4.0, -1.0, 0.5, 3.0, 6.0]);
+        let points =
+            [(-8.0, -5.5), (-6.0, -4.0), (-2.0, -1.0), (-1.0, -0.5), (0.0, 0.0), (2.0, 0.5), (4.0, 1.75), (6.0, 3.0)];
         for (velocity, effort) in points {
             assert!((curve.at(velocity).0 - effort).abs() < 1e-12, "{velocity}: {}", curve.at(velocity).0);
         }
@@ -152,7 +111,7 @@ mod tests {
     fn one_direction_may_be_braked_alone() {
         for (velocity, expected) in [(1.5, 1.5 * (-2.0_f64).exp()), (-1.5, -1.5)] {
             let trial = Trial { parameters: [0.1, 0.0, 0.0, 1.0], position: 0.0, velocity, step: 1e-3 };
-            let motion = trial.follow(&VelocityCurve, 0, &[0.0, 0.0, 0.0, 0.03, 0.2, 0.6, 3.0], &[0.0; 1_001]);
+            let motion = trial.follow(&VelocityCurve, 0, &[0.0, 0.0, 0.2, 0.6, 3.0], &[0.0; 1_001]);
             assert!((motion[1_000].velocity - expected).abs() < 1e-5, "{} not {expected}", motion[1_000].velocity);
         }
     }

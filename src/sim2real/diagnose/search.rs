@@ -6,7 +6,7 @@ use super::evidence::Evidence;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::{self, Place};
 use super::selection::Selection;
-use super::weigh::squares;
+use super::weigh::{gain, squares};
 use super::{Progress, free_run, gates, select};
 use crate::sim2real::Twin;
 
@@ -31,7 +31,7 @@ pub(super) fn searched<T: Twin>(
     let in_windows = Inquiry { evidence, ..*inquiry };
     let (on_windows, places_there) = settled(&in_windows, progress);
     // What windows have found may be near enough for a free run to tell the rest.
-    let rest = may_tell_more(inquiry, &selection, &on_windows)
+    let rest = may_tell_more(inquiry, &selection, (&in_windows, &on_windows))
         .then(|| rivals::settled(inquiry, select::resumed(inquiry, &on_windows, progress)));
     let there = |rest: &Selection<T>| rest.complete() && free_run::bears_out((&in_windows, &on_windows), (inquiry, rest));
     match rest.filter(|(rest, _)| there(rest)) {
@@ -42,10 +42,19 @@ pub(super) fn searched<T: Twin>(
 }
 
 /// Whether a free run may tell of more than windows have found: they explained themselves, and the `selection` that was made in free run did
-/// not begin with the same, which has led where it would again.
-fn may_tell_more<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>, on_windows: &Selection<T>) -> bool {
-    if !on_windows.complete() || on_windows.selected.added.is_empty() {
+/// not begin with the same, which has led where it would again. Where they found too little of something to keep it, a free run, which
+/// adds that up, begins with it.
+fn may_tell_more<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    selection: &Selection<T>,
+    (in_windows, on_windows): (&Inquiry<'_, T>, &Selection<T>),
+) -> bool {
+    if !on_windows.complete() {
         return false;
+    }
+    if on_windows.selected.added.is_empty() {
+        let best = on_windows.best_of_stage(1);
+        return best.is_some_and(|best| gain(in_windows, &on_windows.recalibrated, best) > 0.0);
     }
     let began_there = |best: &&Hypothesis<T>| best.set() == on_windows.selected.set();
     let before = selection.best_of_stage(on_windows.selected.added.len()).filter(began_there);
