@@ -445,3 +445,23 @@ fn what_acts_before_what_was_found_first_is_found_there() {
 fn what_a_form_is_off_by_is_not_what_a_wider_law_completes() {
     assert_eq!(names(&tried(1026, 351)), ["coulomb_friction"]);
 }
+
+/// Teeth of a motor on an axis that adds up what they do: a free run came to another number of them, and left a little that is slower than
+/// noise; windows tell the number, and hardly that there are any.
+#[test]
+fn what_gains_too_little_on_windows_begins_a_free_run() {
+    assert_eq!(names(&tried(1026, 360)), ["cogging"]);
+}
+
+/// A linkage that moves its load nearer to the axis and away from it.
+#[test]
+fn an_inertia_that_goes_with_the_position_is_no_teeth_and_no_load() {
+    assert_eq!(tried(1026, 138).verdict, Verdict::Unexplained);
+}
+
+/// Friction of one direction, told as a gain of that side: the curve that beats it has four constants more, and leaves a third of what it
+/// leaves elsewhere.
+#[test]
+fn a_curve_is_held_to_what_it_was_not_fitted_to() {
+    assert_eq!(tried(1023, 246).verdict, Verdict::Unexplained);
+}
