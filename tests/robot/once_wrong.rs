@@ -465,3 +465,10 @@ fn an_inertia_that_goes_with_the_position_is_no_teeth_and_no_load() {
 fn a_curve_is_held_to_what_it_was_not_fitted_to() {
     assert_eq!(tried(1023, 246).verdict, Verdict::Unexplained);
 }
+
+/// Lost samples, and noise that remembers itself: in the held-out recording it happens to be louder, by three standard deviations.
+#[test]
+fn noise_of_one_colour_that_is_louder_elsewhere_is_nothing_unknown() {
+    let trial = tried(1027, 260);
+    assert_eq!((names(&trial), trial.verdict), (vec!["dropout"], Verdict::Named));
+}

@@ -257,10 +257,10 @@ pub(super) fn slowly_above<T>(selected: &Hypothesis<T>, times: f64) -> bool {
 /// What is said where the fitted data show nothing, of what held-out ones show.
 ///
 /// What is clean where it was fitted and off elsewhere was not moved enough to be told. But noise of signals is no louder where a plant is
-/// moved otherwise: what went for the noise of another colour, and grows, is something unknown.
+/// moved otherwise: what went for noise of another colour, though it is not of one alone, and grows, is something unknown.
 fn unseen_there<T>(selected: &Hypothesis<T>, findings: &Findings) -> Verdict {
     let clean = findings.followed && selected.within(NEAR_THE_NOISE);
-    let coloured = selected.misfits.iter().any(|misfit| misfit.level > 1.0);
+    let coloured = selected.misfits.iter().any(|misfit| misfit.level > 1.0 && !misfit.one_colour);
     let grown = findings.sampled && findings.fits.iter().any(|fit| grown(fit, selected));
     match (findings.fits.iter().any(far_off), grown) {
         (true, _) if clean => Verdict::NotExcited,
@@ -430,10 +430,12 @@ mod tests {
         );
         // What a floor of 1 stands for is the noise with its colour.
         let mut coloured = leaving(7.0, 400.0);
-        coloured.misfits[0].level = 7.0;
+        (coloured.misfits[0].level, coloured.misfits[0].one_colour) = (7.0, false);
         assert_eq!(unseen_there(&coloured, &findings(1.3)), Verdict::NoMismatch, "of so few it may be chance");
         assert_eq!(unseen_there(&coloured, &findings(1.9)), Verdict::Unexplained, "a bent shaft, and no noise");
         assert_eq!(unseen_there(&coloured, &findings(50.0)), Verdict::NotExcited, "a pole that slips");
+        coloured.misfits[0].one_colour = true;
+        assert_eq!(unseen_there(&coloured, &findings(1.9)), Verdict::NotExcited, "noise, and a limit that is hardly reached");
         assert!(slowly_above(&leaving(1.4, 400.0), SLOWLY_ABOVE), "a base that shakes a little");
         assert!(!slowly_above(&leaving(1.4, 3_000.0), SLOWLY_ABOVE), "and noise that hardly remembers itself");
     }

@@ -92,7 +92,9 @@ pub(super) fn recognized<T: Twin>(
         (signs.step > 0.0).then(|| format!("the sensor counts in steps of {} {unit}", words::figure(signs.step, 3))),
     ];
     let told = of_signs.into_iter().flatten().collect::<Vec<_>>().join("; ");
-    if diagnosis.verdict == Verdict::NoMismatch {
+    // What was not moved enough to be told of does not unsay what is seen.
+    let nothing_else = diagnosis.verdict == Verdict::NotExcited && diagnosis.effects.is_empty();
+    if diagnosis.verdict == Verdict::NoMismatch || nothing_else {
         diagnosis.verdict = Verdict::Named;
         diagnosis.summary =
             format!("The recordings show that {told}; for the rest the {} explains them.", inquiry.twin.name());
