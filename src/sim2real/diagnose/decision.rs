@@ -435,7 +435,11 @@ mod tests {
         assert_eq!(unseen_there(&coloured, &findings(1.9)), Verdict::Unexplained, "a bent shaft, and no noise");
         assert_eq!(unseen_there(&coloured, &findings(50.0)), Verdict::NotExcited, "a pole that slips");
         coloured.misfits[0].one_colour = true;
-        assert_eq!(unseen_there(&coloured, &findings(1.9)), Verdict::NotExcited, "noise, and a limit that is hardly reached");
+        assert_eq!(
+            unseen_there(&coloured, &findings(1.9)),
+            Verdict::NotExcited,
+            "noise, and a limit that is hardly reached"
+        );
         assert!(slowly_above(&leaving(1.4, 400.0), SLOWLY_ABOVE), "a base that shakes a little");
         assert!(!slowly_above(&leaving(1.4, 3_000.0), SLOWLY_ABOVE), "and noise that hardly remembers itself");
     }
