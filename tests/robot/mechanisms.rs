@@ -274,6 +274,13 @@ const CASES: &[Case] = &[
         },
         most: 2e-5,
     },
+    Case {
+        mechanism: "inertia_curve",
+        form: "along",
+        values: &[0.1, -0.04],
+        law: |_, x, u| shaped(x, u, x[0] * (0.1 - 0.04 * x[0]), 0.1 - 0.08 * x[0]),
+        most: 2e-5,
+    },
     Case { mechanism: "stiffness", form: "straight", values: &[1.5], law: |_, x, u| plain(x, u, -1.5 * x[0]), most: 2e-5 },
     Case {
         mechanism: "stiffness",
