@@ -16,16 +16,14 @@ const AS_BEFORE: f64 = 1.02;
 /// What is selected, its rivals, and whether that was on the windows of `evidence` rather than in the free run of `inquiry`.
 ///
 /// Where a plant adds up errors, a free run tells most if the physics is complete, and hardly anything if it is not: windows are asked
-/// where it leaves more than noise.
+/// where it leaves more than noise, or what is slower.
 pub(super) fn searched<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     evidence: &Evidence<'_, T::Stimulus>,
     progress: Progress<'_>,
 ) -> (Selection<T>, Vec<Place>, bool) {
     let (selection, places) = settled(inquiry, progress);
-    // What is slower than noise would be told to be unexplained.
-    let explained = selection.complete() && !slowly_above(&selection.selected, SLOWLY_LEFT);
-    if evidence.window.is_none() || explained {
+    if evidence.window.is_none() || explains(&selection) {
         return (selection, places, false);
     }
     let in_windows = Inquiry { evidence, ..*inquiry };
@@ -33,12 +31,20 @@ pub(super) fn searched<T: Twin>(
     // What windows have found may be near enough for a free run to tell the rest.
     let rest = may_tell_more(inquiry, &selection, (&in_windows, &on_windows))
         .then(|| rivals::settled(inquiry, select::resumed(inquiry, &on_windows, progress)));
-    let there = |rest: &Selection<T>| rest.complete() && free_run::bears_out((&in_windows, &on_windows), (inquiry, rest));
+    // Windows do not see what is slow: where little else is left, it is a free run that has to explain that.
+    let slow = selection.complete();
+    let enough = |rest: &Selection<T>| if slow { explains(rest) } else { rest.complete() };
+    let there = |rest: &Selection<T>| enough(rest) && free_run::bears_out((&in_windows, &on_windows), (inquiry, rest));
     match rest.filter(|(rest, _)| there(rest)) {
         Some((rest, places)) => (rest, places, false),
-        None if free_run::worse_than((&in_windows, &on_windows), &selection) => (selection, places, false),
+        None if slow || free_run::worse_than((&in_windows, &on_windows), &selection) => (selection, places, false),
         None => (on_windows, places_there, true),
     }
+}
+
+/// Whether hardly more than noise is left, and nothing that is slower than noise.
+fn explains<T: Twin>(selection: &Selection<T>) -> bool {
+    selection.complete() && !slowly_above(&selection.selected, SLOWLY_LEFT)
 }
 
 /// Whether a free run may tell of more than windows have found: they explained themselves, and the `selection` that was made in free run did
