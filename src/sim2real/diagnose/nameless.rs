@@ -3,7 +3,8 @@
 //!
 //! A law that acts on something else may go with the velocity for as long as one motion lasts, as the command of one side does with motion
 //! to that side; and the teeth of a motor may go with what a linkage makes of its load. Where a curve in its place leaves less of what was
-//! fitted, and less by far of what was not, it is that which the effort goes with, and the name is that of nothing that is there. Laws that are such curves themselves have nothing to fear from one.
+//! fitted, and less by far of what was not, it is that which the effort goes with, and the name is that of nothing that is there. Laws that
+//! are such curves themselves have nothing to fear from one.
 //!
 //! Source: Armstrong-Hélouvry, Dupont & Canudas de Wit, "A survey of models, analysis tools and compensation methods for the control of
 //! machines with friction", Automatica 30 (1994): friction as a map of velocity that is found before a law is.
