@@ -50,11 +50,11 @@ pub(super) fn oracle<P: Plant>(
     }
     let others: Vec<String> = known.into_iter().filter(|known| !names.contains(&known.as_str())).collect();
     let of_these = twin.clone().excluding(&others);
-    let (bare, told) = rayon::join(bare, || diagnose(&of_these, train, test, Seed(0), &|_, _, _| {}));
+    let told = diagnose(&of_these, train, test, Seed(0), &|_, _, _| {});
     let mut attempts: Vec<Attempt> =
         [diagnosed, &told].into_iter().filter_map(|outcome| as_found(outcome, names, channel)).collect();
     if as_found(&told, names, channel).is_none() {
-        attempts.extend(as_fitted(twin, train, test, names, channel, &bare));
+        attempts.extend(as_fitted(twin, train, test, names, channel, &bare()));
     }
     attempts.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, fit)| fit)
 }

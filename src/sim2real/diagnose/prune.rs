@@ -57,6 +57,16 @@ pub(super) fn pruned<T: Twin>(
     }
 }
 
+/// Whether each mechanism of `whole` is needed, which leaves less than what is fitted `without` it.
+pub(super) fn all_needed<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    bare: &Hypothesis<T>,
+    whole: &Hypothesis<T>,
+    without: &[Hypothesis<T>],
+) -> bool {
+    without.iter().all(|less| gain(inquiry, less, whole) > ACCEPT && needed(inquiry, bare, less, whole))
+}
+
 /// `whole` with one of its mechanisms left out, in their order.
 fn parts<T: Twin>(inquiry: &Inquiry<'_, T>, whole: &Hypothesis<T>) -> Vec<Hypothesis<T>> {
     (0..whole.added.len()).into_par_iter().map(|i| inquiry.without(whole, i)).collect()

@@ -22,15 +22,20 @@ pub(super) fn searched<T: Twin>(
     evidence: &Evidence<'_, T::Stimulus>,
     progress: Progress<'_>,
 ) -> (Selection<T>, Vec<Place>, bool) {
-    let (selection, places) = settled(inquiry, progress);
+    let given: Vec<f64> = inquiry.twin.parameters().iter().map(|p| p.nominal).collect();
+    let as_given = (inquiry.twin, given.as_slice());
+    let anew = |inquiry: &Inquiry<'_, T>| select::select(inquiry, inquiry.recalibrated(), progress);
+    let (selection, places) = settled(inquiry, as_given, anew, progress);
     if evidence.window.is_none() || explains(&selection) {
         return (selection, places, false);
     }
     let in_windows = Inquiry { evidence, ..*inquiry };
-    let (on_windows, places_there) = settled(&in_windows, progress);
+    let (on_windows, places_there) = settled(&in_windows, as_given, anew, progress);
     // What windows have found may be near enough for a free run to tell the rest.
-    let rest = may_tell_more(inquiry, &selection, (&in_windows, &on_windows))
-        .then(|| rivals::settled(inquiry, select::resumed(inquiry, &on_windows, progress)));
+    let found = (&on_windows.selected.twin, on_windows.selected.fit.values.as_slice());
+    let gone_on = |inquiry: &Inquiry<'_, T>| select::resumed(inquiry, &on_windows, progress);
+    let rest =
+        may_tell_more(inquiry, &selection, (&in_windows, &on_windows)).then(|| settled(inquiry, found, gone_on, progress));
     // Windows do not see what is slow: where little else is left, it is a free run that has to explain that.
     let slow = selection.complete();
     let enough = |rest: &Selection<T>| if slow { explains(rest) } else { rest.complete() };
@@ -72,16 +77,24 @@ fn as_good<T>(before: &Hypothesis<T>, again: &Hypothesis<T>) -> bool {
     squares(before) <= AS_BEFORE * squares(again)
 }
 
-/// Selects and settles with steps of integration as long as they may be, then once more with the twin's own.
-fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> (Selection<T>, Vec<Place>) {
+/// What is `selected`, and settled, with steps of integration as long as they may be where that begins, then fitted once more with the
+/// twin's own.
+fn settled<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    (twin, values): (&T, &[f64]),
+    selected: impl Fn(&Inquiry<'_, T>) -> Selection<T>,
+    progress: Progress<'_>,
+) -> (Selection<T>, Vec<Place>) {
     progress("refitting the twin's own parameters", 0, 1);
-    let given: Vec<f64> = inquiry.twin.parameters().iter().map(|p| p.nominal).collect();
-    if let Some(step) = gates::exploring_step(inquiry.twin, &given, inquiry.evidence) {
+    let with_rivals = |inquiry: &Inquiry<'_, T>| {
+        let selection = selected(inquiry);
+        progress("looking for rivals", 0, 1);
+        rivals::settled(inquiry, selection)
+    };
+    if let Some(step) = gates::exploring_step(twin, values, inquiry.evidence) {
         let twin = inquiry.twin.stepping(step);
         let coarse = Inquiry { twin: &twin, ..*inquiry };
-        let selection = select::select(&coarse, coarse.recalibrated(), progress);
-        progress("looking for rivals", 0, 1);
-        let (selection, places) = rivals::settled(&coarse, selection);
+        let (selection, places) = with_rivals(&coarse);
         let best = &selection.selected;
         let moved = gates::moved(&best.twin, &best.fit.values, inquiry.evidence, step, gates::own_step(inquiry.twin));
         progress("fitting with the twin's own step", 0, 1);
@@ -94,9 +107,7 @@ fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, progress: Progress<'_>) -> (Select
             return (refitted, places);
         }
     }
-    let selection = select::select(inquiry, inquiry.recalibrated(), progress);
-    progress("looking for rivals", 0, 1);
-    rivals::settled(inquiry, selection)
+    with_rivals(inquiry)
 }
 
 #[cfg(test)]

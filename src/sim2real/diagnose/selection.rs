@@ -1,9 +1,11 @@
 //! A selection: the set of mechanisms that was selected, what it does without each of them, and how all others did; and how it changes.
 
+use rayon::prelude::*;
+
 use super::Score;
 use super::free_run::strays;
 use super::hypothesis::{Hypothesis, Inquiry};
-use super::prune::pruned;
+use super::prune::{all_needed, pruned};
 use super::pursue::pursued;
 use super::weigh::{ABOVE_NOISE, lead};
 use crate::sim2real::{Candidate, Twin};
@@ -69,7 +71,16 @@ impl<T: Twin> Selection<T> {
     pub fn refitted(&self, inquiry: &Inquiry<'_, T>) -> Self {
         let whole = || (!self.selected.added.is_empty()).then(|| inquiry.refitted(&self.selected));
         let (recalibrated, whole) = rayon::join(|| inquiry.refitted(&self.recalibrated), whole);
-        self.with_set(pruned(inquiry, &recalibrated, Vec::from_iter(whole)))
+        let Some(whole) = whole else { return self.with_set((recalibrated.clone(), recalibrated, Vec::new())) };
+        // Where it stands with longer steps nearly everything stands with these.
+        let without: Vec<Hypothesis<T>> = match self.without.as_slice() {
+            [_] => vec![recalibrated.clone()],
+            several => several.par_iter().map(|less| inquiry.refitted(less)).collect(),
+        };
+        if all_needed(inquiry, &recalibrated, &whole, &without) {
+            return self.with_set((recalibrated, whole, without));
+        }
+        self.with_set(pruned(inquiry, &recalibrated, vec![whole]))
     }
 
     /// This selection, nothing of it fitted anew, as another inquiry sees it.
