@@ -70,14 +70,14 @@ pub fn draw(seed: Seed, index: usize) -> Case {
         let sizes = plan.sizes(own.child(&format!("sizes {}", attempt / PATIENCE)));
         let set = Set::draw(&plan, own.child(&format!("attempt {attempt}")));
         match set.concealing(&plan, &sizes) {
-            Ok(recipes) => return set.case(index, &plan, &recipes),
-            Err(Some(recipes)) => nearest = Some((set, recipes)),
+            Ok(concealed) => return set.case(index, &plan, &concealed),
+            Err(Some(concealed)) => nearest = Some((set, concealed)),
             Err(None) => {}
         }
     }
     // Only a name that no arm shows at any strength gets here: then it is a case of what it comes to.
-    let (set, recipes) = nearest.unwrap_or_else(|| (Set::draw(&plan, own), Vec::new()));
-    set.case(index, &plan, &recipes)
+    let (set, concealed) = nearest.unwrap_or_else(|| (Set::draw(&plan, own), Dosage::default()));
+    set.case(index, &plan, &concealed)
 }
 
 impl Plan {
@@ -121,6 +121,13 @@ impl Plan {
 
 /// A recipe at a strength.
 type Dosed = (Recipe, f64);
+
+/// Recipes at their strengths, and the size of each beside the others in the recording to learn from.
+#[derive(Default)]
+struct Dosage {
+    dosed: Vec<Dosed>,
+    sizes: Vec<f64>,
+}
 
 /// An arm and how it is moved, before anything is concealed.
 struct Set {
@@ -199,7 +206,7 @@ impl Set {
     }
 
     /// The recipes at strengths that give `sizes`; what comes nearest, or nothing, where that is not to be had.
-    fn concealing(&self, plan: &Plan, sizes: &[f64]) -> Result<Vec<Dosed>, Option<Vec<Dosed>>> {
+    fn concealing(&self, plan: &Plan, sizes: &[f64]) -> Result<Dosage, Option<Dosage>> {
         let noise = self.noise_of(0);
         let hideable = self.hideable();
         let mut dosed: Vec<Dosed> = Vec::new();
@@ -224,9 +231,11 @@ impl Set {
         if plan.kind != Kind::NotExcited && (0..dosed.len()).any(|k| self.hides(&dosed, k, &hideable)) {
             return Err(None);
         }
-        let measured = self.sizes(&dosed, &noise, &hideable);
+        let sizes = self.sizes(&dosed, &noise, &hideable);
         let wanted = |size: &f64| plan.kind == Kind::NotExcited || (SIZES.0 * 0.9..SIZES.1 * 1.2).contains(size);
-        if measured.iter().all(wanted) { Ok(dosed) } else { Err(Some(dosed)) }
+        let wanted = sizes.iter().all(wanted);
+        let all = Dosage { dosed, sizes };
+        if wanted { Ok(all) } else { Err(Some(all)) }
     }
 
     fn hideable(&self) -> Hideable {
@@ -265,10 +274,10 @@ impl Set {
         effects
     }
 
-    fn case(self, index: usize, plan: &Plan, dosed: &[Dosed]) -> Case {
+    fn case(self, index: usize, plan: &Plan, concealed: &Dosage) -> Case {
         let precision = if plan.kind == Kind::Null(Null::Coarse) { self.coarse() } else { Precision::Fine };
         let record = |recording: usize| {
-            let effects = self.in_recording(plan, dosed, recording);
+            let effects = self.in_recording(plan, &concealed.dosed, recording);
             let drive = &self.drives[recording];
             let seed = self.seed.child(RECORDINGS[recording]);
             let motion = Machine::new(self.arm, &effects).run(drive, precision, seed);
@@ -279,7 +288,7 @@ impl Set {
             (table.with("q", Column::Real(read)), motion)
         };
         let ((train, motion), (test, _)) = (record(0), record(1));
-        let label = self.label(index, plan, dosed, &motion, precision);
+        let label = self.label(index, plan, concealed, &motion, precision);
         Case { linear: self.arm.linear, nominal: self.nominal, uncertainty: self.uncertainty, train, test, label }
     }
 
@@ -288,15 +297,15 @@ impl Set {
         Precision::Euler(self.drives[0].sample / (self.drives[0].sample / 0.002).ceil())
     }
 
-    fn label(&self, index: usize, plan: &Plan, dosed: &[Dosed], motion: &Motion, precision: Precision) -> Label {
-        let (noise, hideable) = (self.noise_of(0), self.hideable());
+    fn label(&self, index: usize, plan: &Plan, concealed: &Dosage, motion: &Motion, precision: Precision) -> Label {
+        let Dosage { dosed, sizes } = concealed;
         let learnt = self.in_recording(plan, dosed, 0);
         let absent = learnt.len() < dosed.len();
-        let sizes = if absent { vec![0.0; dosed.len()] } else { self.sizes(dosed, &noise, &hideable) };
+        let sizes = if absent { vec![0.0; dosed.len()] } else { sizes.clone() };
         let machine = Machine::new(self.arm, &learnt);
         let sensor = self.sensor(&learnt, 0);
         let met = Met::of(&self.drives[0], motion);
-        let concealed = dosed.iter().zip(&sizes).map(|((recipe, strength), size)| {
+        let effects = dosed.iter().zip(&sizes).map(|((recipe, strength), size)| {
             let effect = recipe.at(*strength, &self.scales);
             Concealed {
                 id: recipe.id.to_owned(),
@@ -319,7 +328,7 @@ impl Set {
             index,
             kind: plan.kind,
             outside: outside.then(|| (plan.ids[0].to_owned(), sizes.first().copied().unwrap_or(0.0))),
-            effects: if outside { Vec::new() } else { concealed.collect() },
+            effects: if outside { Vec::new() } else { effects.collect() },
             tolerated,
             arm: self.arm,
             nominal: self.nominal,

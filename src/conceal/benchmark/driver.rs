@@ -81,6 +81,11 @@ impl Driver {
         pole.max(if self.slew.is_some() { 1.0 / ANSWER } else { 0.0 })
     }
 
+    /// Whether it has a state: slewed, behind poles, or warm.
+    pub fn remembers(&self) -> bool {
+        self.slew.is_some() || self.poles.is_some() || self.heat.is_some()
+    }
+
     /// Whether a command is bent by a tenth or more of itself.
     pub fn bends(&self, command: f64) -> bool {
         self.ceiling.is_some_and(|limit| limit * (command / limit).tanh().abs() < 0.9 * command.abs())

@@ -185,6 +185,11 @@ impl Load {
         if torque == 0.0 { 0.0 } else { torque * (1.0 + 0.03 * (2.0 * position / reach).sin()) }
     }
 
+    /// Whether it has a state: bristles, what yields, or what no registry has.
+    pub fn remembers(&self) -> bool {
+        self.bristles.is_some() || self.yielding.is_some() || self.foreign.is_some()
+    }
+
     /// The fastest rate [1/s] at which anything here moves, for an arm of `inertia` at `velocity`.
     pub fn fastest(&self, inertia: f64, position: f64, velocity: f64, rubbing: f64) -> f64 {
         let mut rate = 0.0_f64;

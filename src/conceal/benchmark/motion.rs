@@ -96,12 +96,16 @@ pub(super) struct Machine {
     load: Load,
     /// Whether nothing acts on its motion: most runs are of arms alone, and many.
     bare: bool,
+    /// Whether anything beside the arm has a state of its own.
+    remembers: bool,
 }
 
 impl Machine {
     pub fn new(arm: Arm, effects: &[Effect]) -> Self {
         let acts = |effect: &Effect| !effect.is_of_sensor();
-        Self { arm, driver: Driver::of(effects), load: Load::of(effects), bare: !effects.iter().any(acts) }
+        let (driver, load) = (Driver::of(effects), Load::of(effects));
+        let remembers = driver.remembers() || load.remembers();
+        Self { arm, driver, load, bare: !effects.iter().any(acts), remembers }
     }
 
     pub fn driver(&self) -> &Driver {
@@ -200,8 +204,10 @@ impl Machine {
         state.velocity += step * rate.velocity;
         state.motor_position += step * rate.motor_position;
         state.motor_velocity += step * rate.motor_velocity;
-        state.driver.iter_mut().zip(&rate.driver).for_each(|(value, rate)| *value += step * rate);
-        state.load.iter_mut().zip(&rate.load).for_each(|(value, rate)| *value += step * rate);
+        if self.remembers {
+            state.driver.iter_mut().zip(&rate.driver).for_each(|(value, rate)| *value += step * rate);
+            state.load.iter_mut().zip(&rate.load).for_each(|(value, rate)| *value += step * rate);
+        }
         state
     }
 
