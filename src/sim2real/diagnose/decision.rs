@@ -9,6 +9,7 @@ use super::periodic;
 use super::remainder::{MOSTLY_LEFT, NEAR_THE_NOISE, dependences, strongest};
 use super::selection::Selection;
 use super::structure::{DEPENDENT, Dependence};
+use super::whiteness::ChannelMisfit;
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Twin};
 
@@ -18,8 +19,10 @@ const FORM_ERROR: f64 = 0.10;
 const NOISE_KNOWN: f64 = 1.05;
 /// A residual counts as structured where a regression foretells this part of it on held-out data.
 pub(super) const FORETOLD: f64 = 0.10;
-/// Where this part of it is foretold, what is left is physics, however small it is beside what was found.
+/// Where this part of it is foretold, what is left is physics, however small it is beside what was found, ...
 const FORETOLD_WELL: f64 = 0.25;
+/// ... but for less than this part of the misfit: a law whose form is off by a fifteenth leaves as much, and the motion foretells that.
+const OF_ANY_FORM: f64 = 0.005;
 /// A twin whose mean squared residual is this many times the noise does not explain the recordings, whether or not
 /// anything foretells what is left.
 const FAR_ABOVE_THE_NOISE: f64 = 9.0;
@@ -131,6 +134,11 @@ pub(super) fn held_out_remainder(fit: &ChannelFit) -> f64 {
     if misfit > 0.0 { above(fit.trued_rmse, NOISE_KNOWN) / misfit } else { 0.0 }
 }
 
+/// Whether the motion foretells so much of what is left that it is physics, and that is more than any form leaves.
+fn foretold_well(foretold: f64, fits: &[ChannelFit]) -> bool {
+    foretold > FORETOLD_WELL && fits.iter().any(|fit| held_out_remainder(fit) > OF_ANY_FORM)
+}
+
 /// Whether so much is left on held-out signals that what was named does not explain them.
 fn fails_unseen(fit: &ChannelFit) -> bool {
     let remainder = held_out_remainder(fit);
@@ -140,6 +148,18 @@ fn fails_unseen(fit: &ChannelFit) -> bool {
 /// Whether the recalibrated twin leaves more than the noise on held-out data.
 pub(super) fn above_the_noise(fit: &ChannelFit) -> bool {
     fit.recalibrated_rmse * fit.recalibrated_rmse > HARDLY_ABOVE * fit.noise_floor * fit.noise_floor
+}
+
+/// The same beyond chance: of noise that remembers itself, few rows are independent, and one recording may have more of it than another.
+fn visible<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
+    let coloured = |misfit: &&ChannelMisfit| misfit.channel == fit.channel && misfit.level > 1.0 && misfit.one_colour;
+    let by_chance = selected.misfits.iter().find(coloured).map_or(1.0, by_chance);
+    above_the_noise(fit) && fit.recalibrated_rmse.powi(2) > by_chance * fit.noise_floor.powi(2)
+}
+
+/// What noise leaves at the most in one recording, times what it left in the fitted one, if as much is held out as was fitted.
+fn by_chance(fitted: &ChannelMisfit) -> f64 {
+    (BY_CHANCE * 2.0 / fitted.effective().max(1.0).sqrt()).exp()
 }
 
 /// Whether what was named does worse on held-out data than nothing.
@@ -197,7 +217,7 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
         return Verdict::Unexplained;
     }
     if !findings.fits.iter().any(|fit| confirms(fit, findings.sampled)) {
-        let visible = findings.fits.iter().any(above_the_noise);
+        let visible = findings.fits.iter().any(|fit| visible(fit, &selection.selected));
         // What those held out do not confirm must be all that the fitted ones ask for.
         let clean = selection.selected.within(FAR_ABOVE_THE_NOISE)
             && !(visible && asks_for_more(selection.selected.added.len(), &selection.scores));
@@ -214,7 +234,7 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
     let doubtful = findings.sampled && library(effects) < least_likely(effects, unseen);
     let unexplained = left_over || findings.inexact || findings.sampled && slowly_above(&selection.selected, SLOWLY_LEFT);
     let too_much = findings.remainder > form_error(library(effects), findings.foretold, findings.sampled)
-        || findings.foretold > FORETOLD_WELL;
+        || foretold_well(findings.foretold, &findings.fits);
     if doubtful || findings.beyond || unexplained && too_much {
         return Verdict::Unexplained;
     }
@@ -275,9 +295,7 @@ fn unseen_there<T>(selected: &Hypothesis<T>, findings: &Findings) -> Verdict {
 fn grown<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
     let Some(own) = selected.misfits.iter().find(|misfit| misfit.channel == fit.channel) else { return false };
     let fitted = (own.sum_of_squares / (own.level * own.count.max(1) as f64)).max(1.0);
-    // As much is held out as was fitted, or about that.
-    let by_chance = (BY_CHANCE * 2.0 / own.effective().max(1.0).sqrt()).exp();
-    fit.recalibrated_rmse.powi(2) > GROWN.max(by_chance) * fitted * fit.noise_floor.powi(2)
+    fit.recalibrated_rmse.powi(2) > GROWN.max(by_chance(own)) * fitted * fit.noise_floor.powi(2)
 }
 
 /// What is said of names that held-out signals do not confirm, nor refute where nothing is off there: `known` is how likely it is that
@@ -442,6 +460,26 @@ mod tests {
         );
         assert!(slowly_above(&leaving(1.4, 400.0), SLOWLY_ABOVE), "a base that shakes a little");
         assert!(!slowly_above(&leaving(1.4, 3_000.0), SLOWLY_ABOVE), "and noise that hardly remembers itself");
+    }
+
+    #[test]
+    fn what_noise_may_leave_by_chance_is_not_off() {
+        use crate::sim2real::diagnose::weigh::tests::leaving;
+        assert!(visible(&error(1.2, 1.2), &leaving(1.0, 6_000.0)), "of many rows");
+        let mut coloured = leaving(7.0, 230.0);
+        assert!(visible(&error(1.2, 1.1), &coloured), "what is slower than noise");
+        coloured.misfits[0].level = 7.0;
+        assert!(!visible(&error(1.2, 1.1), &coloured), "of so few it may be chance");
+        assert!(visible(&error(1.3, 1.1), &coloured));
+        coloured.misfits[0].one_colour = false;
+        assert!(visible(&error(1.2, 1.1), &coloured), "and what has two colours may be no noise");
+    }
+
+    #[test]
+    fn what_is_foretold_is_physics_unless_any_form_leaves_as_much() {
+        assert!(foretold_well(0.4, &[error(20.0, 3.0)]), "a fiftieth of the misfit");
+        assert!(!foretold_well(0.4, &[error(40.0, 1.9)]), "a delay that wobbles, in a thousandth");
+        assert!(!foretold_well(0.2, &[error(20.0, 3.0)]), "and noise");
     }
 
     #[test]
