@@ -6,8 +6,9 @@
 //!
 //! Source: Chow, "Tests of equality between sets of coefficients in two linear regressions", Econometrica 28 (1960).
 
-use super::decision::{ABOVE_THE_NOISE, above_the_noise};
+use super::decision::ABOVE_THE_NOISE;
 use super::diagnosis::ChannelFit;
+use super::held_out::above_the_noise;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::{uncertainty, words};
 use crate::sim2real::identify::{Effort, Fit};

@@ -2,30 +2,25 @@
 
 use super::Comparison;
 use super::diagnosis::{ChannelFit, Effect, Score, Verdict};
+use super::held_out::{
+    FAR_ABOVE_THE_NOISE, FORM_ERROR, HARDLY_ABOVE, better, confirms, fails_unseen, far_off, grown, held_out_remainder,
+    visible, worse,
+};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::locate::Covariates;
-use super::needed::INFORMATIVE_ROWS;
 use super::periodic;
-use super::remainder::{MOSTLY_LEFT, NEAR_THE_NOISE, dependences, strongest};
+use super::remainder::{NEAR_THE_NOISE, dependences, strongest};
 use super::selection::Selection;
 use super::structure::{DEPENDENT, Dependence};
-use super::whiteness::ChannelMisfit;
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Twin};
 
-/// A remainder above this part of the first misfit is more than an error of form.
-const FORM_ERROR: f64 = 0.10;
-/// The mean square of the noise is known to this factor.
-const NOISE_KNOWN: f64 = 1.05;
 /// A residual counts as structured where a regression foretells this part of it on held-out data.
 pub(super) const FORETOLD: f64 = 0.10;
 /// Where this part of it is foretold, what is left is physics, however small it is beside what was found, ...
 const FORETOLD_WELL: f64 = 0.25;
 /// ... but for less than this part of the misfit: a law whose form is off by a fifteenth leaves as much, and the motion foretells that.
 const OF_ANY_FORM: f64 = 0.005;
-/// A twin whose mean squared residual is this many times the noise does not explain the recordings, whether or not
-/// anything foretells what is left.
-const FAR_ABOVE_THE_NOISE: f64 = 9.0;
 /// A twin to which nothing can be added and whose mean squared residual is this many times the noise lacks something unknown.
 pub(super) const ABOVE_THE_NOISE: f64 = 2.0;
 /// So does what is slower than noise, so many rows and more, and leaves this many times the noise.
@@ -33,16 +28,8 @@ const SLOW: f64 = 5.0;
 const SLOWLY_ABOVE: f64 = 1.3;
 /// Beside what was named that counts from this many times the noise on: it was fitted to leave as little as it can.
 pub(super) const SLOWLY_LEFT: f64 = 1.1;
-/// What a regression foretells counts where the mean squared residual is more than this many times the noise.
-const HARDLY_ABOVE: f64 = 1.2;
-/// Noise does not grow from one recording to another: a mean squared residual this many times that of the fitted rows is something else, ...
-const GROWN: f64 = 1.3;
-/// ... beyond so many standard deviations of its logarithm by chance.
-const BY_CHANCE: f64 = 3.0;
 /// With fewer rows than this, what is not explained is not called explained either.
 pub(super) const FEWEST_ROWS: usize = 50;
-/// Larger by less than this, an error is as large.
-const WORSE: f64 = 1.02;
 /// What is less likely than this to be the library's is not said to be.
 const HARDLY_THE_LIBRARY: f64 = 0.1;
 /// The same of a single name, and of what does not carry over to held-out data either.
@@ -126,45 +113,9 @@ fn structured(findings: &Findings) -> bool {
     findings.foretold > FORETOLD || findings.dependence.as_ref().is_some_and(|d| d.strength > DEPENDENT)
 }
 
-/// The part of the recalibrated misfit above the noise that is left on held-out data; the noise is known to
-/// [`NOISE_KNOWN`].
-pub(super) fn held_out_remainder(fit: &ChannelFit) -> f64 {
-    let above = |rmse: f64, known: f64| (rmse * rmse - known * fit.noise_floor * fit.noise_floor).max(0.0);
-    let misfit = above(fit.recalibrated_rmse, 1.0);
-    if misfit > 0.0 { above(fit.trued_rmse, NOISE_KNOWN) / misfit } else { 0.0 }
-}
-
 /// Whether the motion foretells so much of what is left that it is physics, and that is more than any form leaves.
 fn foretold_well(foretold: f64, fits: &[ChannelFit]) -> bool {
     foretold > FORETOLD_WELL && fits.iter().any(|fit| held_out_remainder(fit) > OF_ANY_FORM)
-}
-
-/// Whether so much is left on held-out signals that what was named does not explain them.
-fn fails_unseen(fit: &ChannelFit) -> bool {
-    let remainder = held_out_remainder(fit);
-    far_off(fit) && remainder > FORM_ERROR || remainder > MOSTLY_LEFT
-}
-
-/// Whether the recalibrated twin leaves more than the noise on held-out data.
-pub(super) fn above_the_noise(fit: &ChannelFit) -> bool {
-    fit.recalibrated_rmse * fit.recalibrated_rmse > HARDLY_ABOVE * fit.noise_floor * fit.noise_floor
-}
-
-/// The same beyond chance: of noise that remembers itself, few rows are independent, and one recording may have more of it than another.
-fn visible<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
-    let coloured = |misfit: &&ChannelMisfit| misfit.channel == fit.channel && misfit.level > 1.0 && misfit.one_colour;
-    let by_chance = selected.misfits.iter().find(coloured).map_or(1.0, by_chance);
-    above_the_noise(fit) && fit.recalibrated_rmse.powi(2) > by_chance * fit.noise_floor.powi(2)
-}
-
-/// What noise leaves at the most in one recording, times what it left in the fitted one, if as much is held out as was fitted.
-fn by_chance(fitted: &ChannelMisfit) -> f64 {
-    (BY_CHANCE * 2.0 / fitted.effective().max(1.0).sqrt()).exp()
-}
-
-/// Whether what was named does worse on held-out data than nothing.
-fn worse(fit: &ChannelFit) -> bool {
-    fit.trued_rmse > WORSE * fit.recalibrated_rmse
 }
 
 /// The probability that everything named, or one of its rivals each time, is what is missing: the more that is named and
@@ -189,11 +140,6 @@ fn least_likely(effects: &[Effect], unseen: bool) -> f64 {
         [_] => LIKELIER_THAN_NOT,
         _ => HARDLY_THE_LIBRARY,
     }
-}
-
-/// Whether what is left on held-out data stands far above the noise.
-fn far_off(fit: &ChannelFit) -> bool {
-    fit.trued_rmse * fit.trued_rmse > FAR_ABOVE_THE_NOISE * fit.noise_floor * fit.noise_floor
 }
 
 /// What is to be said.
@@ -241,32 +187,9 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
     if unseen || effects.iter().any(|e| e.confidence < CERTAIN) { Verdict::Ambiguous } else { Verdict::Named }
 }
 
-/// Whether what was named does better on held-out data, by more than chance. Of messages one alone may tell of it: whichever of them are
-/// drawn, it is never worse.
-fn confirms(fit: &ChannelFit, sampled: bool) -> bool {
-    let least = fit.improvement_ci95[0];
-    least > 0.0 || !sampled && least >= 0.0 && fit.trued_rmse < fit.recalibrated_rmse
-}
-
-/// Whether what was named moves no more than a few of the held-out rows, in any channel: where it moves many, and they do not confirm it, they
-/// say that it is not so.
-pub(super) fn few_tell(comparisons: &[Comparison]) -> bool {
-    comparisons.iter().filter(|comparison| comparison.held_out).all(|comparison| {
-        let rows = comparison.trued.iter().zip(&comparison.recalibrated).zip(&comparison.measured);
-        let moved = rows.filter(|(_, measured)| measured.is_some()).map(|((trued, recalibrated), _)| trued - recalibrated);
-        let (second, fourth) = moved.fold((0.0, 0.0), |(s, f), d| (s + d * d, f + d.powi(4)));
-        second * second < INFORMATIVE_ROWS as f64 * fourth || second == 0.0
-    })
-}
-
 /// Whether there is no doubt of anything that was named.
 fn overwhelming(effects: &[Effect]) -> bool {
     effects.iter().all(|effect| effect.gain.is_some_and(|gain| gain > OVERWHELMING))
-}
-
-/// Whether held-out errors speak for what was named, though not by more than chance.
-fn better(fits: &[ChannelFit]) -> bool {
-    fits.iter().any(|fit| fit.trued_rmse < fit.recalibrated_rmse) && !fits.iter().any(worse)
 }
 
 /// Whether more than so many times the noise is left of a channel, and slower than noise.
@@ -289,13 +212,6 @@ fn unseen_there<T>(selected: &Hypothesis<T>, findings: &Findings) -> Verdict {
         (false, true) if clean => Verdict::NotExcited,
         _ => Verdict::NoMismatch,
     }
-}
-
-/// Whether more is left of held-out rows than noise leaves that leaves as much as this of the fitted ones.
-fn grown<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
-    let Some(own) = selected.misfits.iter().find(|misfit| misfit.channel == fit.channel) else { return false };
-    let fitted = (own.sum_of_squares / (own.level * own.count.max(1) as f64)).max(1.0);
-    fit.recalibrated_rmse.powi(2) > GROWN.max(by_chance(own)) * fitted * fit.noise_floor.powi(2)
 }
 
 /// What is said of names that held-out signals do not confirm, nor refute where nothing is off there: `known` is how likely it is that
@@ -322,6 +238,7 @@ fn unconfirmed_by_messages(refuted: bool, left_over: bool, remainder: f64) -> Ve
 
 #[cfg(test)]
 mod tests {
+    use super::super::held_out::tests::error;
     use super::*;
     use std::collections::BTreeMap;
 
@@ -341,21 +258,6 @@ mod tests {
             location: None,
             active: Vec::new(),
             moved: Vec::new(),
-        }
-    }
-
-    fn error(recalibrated_rmse: f64, trued_rmse: f64) -> ChannelFit {
-        ChannelFit {
-            channel: "position".into(),
-            unit: "rad".into(),
-            noise_floor: 1.0,
-            nominal_rmse: 20.0,
-            recalibrated_rmse,
-            trued_rmse,
-            nominal_mae: 20.0,
-            recalibrated_mae: recalibrated_rmse,
-            trued_mae: trued_rmse,
-            improvement_ci95: [0.0, 0.0],
         }
     }
 
@@ -463,19 +365,6 @@ mod tests {
     }
 
     #[test]
-    fn what_noise_may_leave_by_chance_is_not_off() {
-        use crate::sim2real::diagnose::weigh::tests::leaving;
-        assert!(visible(&error(1.2, 1.2), &leaving(1.0, 6_000.0)), "of many rows");
-        let mut coloured = leaving(7.0, 230.0);
-        assert!(visible(&error(1.2, 1.1), &coloured), "what is slower than noise");
-        coloured.misfits[0].level = 7.0;
-        assert!(!visible(&error(1.2, 1.1), &coloured), "of so few it may be chance");
-        assert!(visible(&error(1.3, 1.1), &coloured));
-        coloured.misfits[0].one_colour = false;
-        assert!(visible(&error(1.2, 1.1), &coloured), "and what has two colours may be no noise");
-    }
-
-    #[test]
     fn what_is_foretold_is_physics_unless_any_form_leaves_as_much() {
         assert!(foretold_well(0.4, &[error(20.0, 3.0)]), "a fiftieth of the misfit");
         assert!(!foretold_well(0.4, &[error(40.0, 1.9)]), "a delay that wobbles, in a thousandth");
@@ -499,40 +388,10 @@ mod tests {
     }
 
     #[test]
-    fn a_few_messages_confirm_by_never_being_worse_or_by_what_was_overwhelming() {
-        let with = |ci: f64| ChannelFit { improvement_ci95: [ci, 0.9], ..error(0.012, 0.004) };
-        assert!(confirms(&with(0.1), true) && confirms(&with(0.0), false), "a cap that one order of those held out meets");
-        assert!(!confirms(&with(0.0), true) && !confirms(&with(-0.1), false));
-        assert!(!confirms(&error(1.0, 1.0), false), "what moves nothing there says nothing");
+    fn what_is_overwhelming_is_so_of_every_name() {
         let sure = |gain: f64| Effect { gain: Some(gain), ..effect(1.0, &[]) };
         assert!(
             overwhelming(&[sure(400.0)]) && !overwhelming(&[sure(400.0), sure(80.0)]) && !overwhelming(&[effect(1.0, &[])])
         );
-        assert!(better(&[error(0.62, 0.58), error(0.0, 0.0)]) && !better(&[error(0.62, 0.62)]));
-        assert!(!better(&[error(0.62, 0.58), error(1.0, 1.1)]));
-        let unseen = |moved: usize| Comparison {
-            recording: "held out".into(),
-            held_out: true,
-            clock: Clock::Event,
-            channel: "cost".into(),
-            unit: "bps".into(),
-            time: (0..600).map(f64::from).collect(),
-            measured: vec![Some(0.0); 600],
-            nominal: vec![0.0; 600],
-            recalibrated: vec![0.0; 600],
-            trued: (0..600).map(|row| if row < moved { 0.5 } else { 0.0 }).collect(),
-        };
-        assert!(few_tell(&[unseen(0)]) && few_tell(&[unseen(20), unseen(3)]));
-        assert!(!few_tell(&[unseen(3), unseen(60)]), "an impact on a tape that goes on for hours");
-    }
-
-    #[test]
-    fn errors_are_held_to_the_noise_and_to_each_other() {
-        assert!(worse(&error(2.0, 2.1)) && !worse(&error(2.0, 2.0)));
-        assert!(above_the_noise(&error(1.2, 1.0)) && !above_the_noise(&error(1.05, 1.0)));
-        assert!(far_off(&error(9.0, 3.1)) && !far_off(&error(9.0, 2.9)));
-        assert!(fails_unseen(&error(9.0, 3.1)), "a tenth of the misfit is left, far above the noise");
-        assert!(!fails_unseen(&error(9.0, 2.9)), "and close to it that is an error of form");
-        assert!(fails_unseen(&error(3.0, 2.0)), "unless it is a third");
     }
 }

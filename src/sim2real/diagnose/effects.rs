@@ -2,8 +2,9 @@
 
 use super::Found;
 use super::confidence::{Doubts, by_evidence, calibrated};
-use super::decision::{Findings, held_out_remainder};
+use super::decision::Findings;
 use super::diagnosis::{Effect, Estimate, Rival};
+use super::held_out::held_out_remainder;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::rivals::Place;
 use super::weigh::plausibility;

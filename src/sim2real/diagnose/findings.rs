@@ -4,7 +4,7 @@ use super::decision::{self, Findings};
 use super::hypothesis::Inquiry;
 use super::locate::Covariates;
 use super::selection::Selection;
-use super::{Comparison, beyond, constancy, exact, nameless, no_law, noise_of, prove, remainder, uncertainty};
+use super::{Comparison, beyond, constancy, exact, held_out, nameless, no_law, noise_of, prove, remainder, uncertainty};
 use crate::sim2real::any_twin::{AnyStimulus, AnyTwin};
 use crate::sim2real::identify::Fit;
 use crate::sim2real::{Clock, Parameter, Recording, Simulator};
@@ -41,7 +41,7 @@ pub(super) fn findings(
         refuted,
         of_no_law,
         // What recordings have of their own, as what orders foresaw, may be what the fitted ones tell of.
-        few_tell: decision::few_tell(comparisons) && trued.state.values.iter().all(Vec::is_empty),
+        few_tell: held_out::few_tell(comparisons) && trued.state.values.iter().all(Vec::is_empty),
         contradiction: decision::contradiction(inquiry, selected, comparisons),
         followed: remainder::followed(trued, selected),
         dependence: remainder::strongest(&depends),

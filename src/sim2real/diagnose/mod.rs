@@ -7,9 +7,10 @@
 //! what explains little in the other, and `confidence` says how sure one is;
 //! `remainder` asks what is left, and `structure` what that depends on; `prove` measures errors on what was held out, `constancy` asks
 //! whether the same constants hold there, and `nameless` whether a curve of any shape explains more; the `decision` rests on all of these
-//! `findings`, and `verdict` and `words` tell it. `gates` says how long steps of integration may be, and `recognize` sees what needs no fit. `locate`
-//! and `onset` say where and since when the twin is off, `activity` when what was named acted, and `experiment` designs, from the
-//! commands of `excitation`, what to record where rivals are left; `unread` asks what the twin does not read of them. Where recordings
+//! `findings` and on what `held_out` data say, and `verdict` and `words` tell it. `gates` says how long steps of integration may be, and
+//! `recognize` sees what needs no fit. `locate` and `onset` say where and since when the twin is off, `activity` when what was named acted,
+//! and `experiment` designs, from the commands of `excitation`, what to record where rivals are left; `unread` asks what the twin does not
+//! read of them. Where recordings
 //! show several things that no mechanism has in common, each of these `aspects` goes through all of it by itself.
 
 mod activity;
@@ -32,6 +33,7 @@ mod findings;
 mod forms;
 mod free_run;
 mod gates;
+mod held_out;
 mod hypothesis;
 mod locate;
 mod nameless;
