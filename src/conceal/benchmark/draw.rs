@@ -397,9 +397,9 @@ mod tests {
             let mut hits = 0;
             for attempt in 0..6 {
                 let set = Set::draw(&plan, Seed(attempt));
-                let Ok(dosed) = set.concealing(&plan, &[target]) else { continue };
+                let Ok(Dosage { dosed, sizes }) = set.concealing(&plan, &[target]) else { continue };
                 let (noise, hideable) = (set.noise_of(0), set.hideable());
-                let size = set.sizes(&dosed, &noise, &hideable)[0];
+                let size = sizes[0];
                 assert!((size / target - 1.0).abs() < 0.06, "{id}: {size}");
                 let fine = |effects: &[Effect]| {
                     let seed = set.seed.child(RECORDINGS[0]);
