@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::approach::approached;
 use super::evidence::Evidence;
 use super::screen::{Screened, signatures};
 use super::weigh::squares;
@@ -79,9 +80,6 @@ pub(super) struct Inquiry<'a, T: Twin> {
 
 /// A twin that leaves at most this many times the mean square of the noise keeps up with its recordings.
 pub(super) const KEEPS_UP: f64 = 4.0;
-/// Into so many windows recordings are cut, one after the other, to bring a twin near one that it does not follow (multiple shooting:
-/// Bock, "Recent advances in parameter identification techniques for ODE", in *Numerical Treatment of Inverse Problems* (1983)).
-const WINDOWS: [f64; 2] = [24.0, 6.0];
 
 /// What leaves so many times what the same leaves without the last mechanism went astray: with next to nothing of it no more would be left.
 const ASTRAY: f64 = 1.5;
@@ -101,18 +99,7 @@ impl<T: Twin> Inquiry<'_, T> {
         if !starts_anywhere || self.evidence.window.is_some() || directly.within(KEEPS_UP) {
             return directly;
         }
-        let approached = self.begun(self.twin.clone(), Vec::new(), &self.approached(given), None, Effort::Thorough);
-        if squares(&approached) < squares(&directly) { approached } else { directly }
-    }
-
-    /// The twin's own parameters, from `given` on, where they fit windows that start afresh: what a free run is off by early decides where
-    /// it is late.
-    fn approached(&self, given: Vec<f64>) -> Vec<f64> {
-        WINDOWS.iter().fold(given, |values, count| {
-            let evidence = self.evidence.in_windows(*count);
-            let there = Inquiry { evidence: &evidence, ..*self };
-            there.begun(self.twin.clone(), Vec::new(), &values, None, Effort::Thorough).fit.values
-        })
+        approached(self, &given, directly)
     }
 
     /// `parent` with what was `screened` added, fitted from `most` of the starts that screening liked best.

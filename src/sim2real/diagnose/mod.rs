@@ -14,6 +14,7 @@
 //! show several things that no mechanism has in common, each of these `aspects` goes through all of it by itself.
 
 mod activity;
+mod approach;
 mod aspects;
 mod beyond;
 mod by_recording;
