@@ -472,3 +472,12 @@ fn noise_of_one_colour_that_is_louder_elsewhere_is_nothing_unknown() {
     let trial = tried(1027, 260);
     assert_eq!((names(&trial), trial.verdict), (vec!["dropout"], Verdict::Named));
 }
+
+/// An arm that goes over the top, and a twin whose inertia is off by 42 %: a free run's refit ends in a wrong valley, and one of a few long
+/// windows that begins from a wrong state spoils what short ones have found.
+#[test]
+fn short_windows_are_joined_to_a_free_run() {
+    let trial = tried(1029, 190);
+    assert_eq!(trial.verdict, Verdict::NoMismatch, "{:?}", trial.found);
+    assert!(trial.held_out.recalibrated < 0.037, "{:?}", trial.held_out);
+}

@@ -7,8 +7,8 @@
 use super::hypothesis::{Hypothesis, Inquiry, KEEPS_UP};
 use super::locate::identity;
 use super::weigh::squares;
-use crate::sim2real::Twin;
 use crate::sim2real::identify::{Effort, State};
+use crate::sim2real::{Clock, Twin};
 
 /// Into so many windows recordings are cut, ...
 const SHORT: f64 = 24.0;
@@ -17,8 +17,22 @@ const LONG: f64 = 6.0;
 /// Where the short ones are followed, they are joined to so many, one after the other.
 const JOINED: [f64; 3] = [12.0, 6.0, 3.0];
 
+impl<T: Twin> Inquiry<'_, T> {
+    /// The twin as given, its own parameters refitted: from where they are given and, where that does not follow, from where windows lead.
+    pub fn recalibrated(&self) -> Hypothesis<T> {
+        let given: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
+        let directly = self.begun(self.twin.clone(), Vec::new(), &given, None, Effort::Thorough);
+        // What starts in the middle of a closed loop lacks what its controller remembers.
+        let starts_anywhere = self.twin.clock() != Clock::Event && !self.twin.in_closed_loop();
+        if !starts_anywhere || self.evidence.window.is_some() || directly.within(KEEPS_UP) {
+            return directly;
+        }
+        approached(self, &given, directly)
+    }
+}
+
 /// The best fit of the inquiry's twin to free runs that windows lead to, or what was fitted `directly` if that leaves less.
-pub(super) fn approached<T: Twin>(inquiry: &Inquiry<'_, T>, given: &[f64], directly: Hypothesis<T>) -> Hypothesis<T> {
+fn approached<T: Twin>(inquiry: &Inquiry<'_, T>, given: &[f64], directly: Hypothesis<T>) -> Hypothesis<T> {
     let short = in_windows(inquiry, SHORT, given, &[]);
     let long = in_windows(inquiry, LONG, &short.0.fit.values, &[]);
     let best = better(directly, begun_from(inquiry, &long.0.fit.values, &[]));

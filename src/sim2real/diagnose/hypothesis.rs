@@ -2,13 +2,12 @@
 
 use std::ops::Range;
 
-use super::approach::approached;
 use super::evidence::Evidence;
 use super::screen::{Screened, signatures};
 use super::weigh::squares;
 use super::whiteness::{ChannelMisfit, channel_misfits};
 use crate::sim2real::identify::{Block, Effort, Fit, Problem, State, fit};
-use crate::sim2real::{Candidate, Clock, Parameter, Part, Seed, Twin};
+use crate::sim2real::{Candidate, Parameter, Part, Seed, Twin};
 
 /// A mean squared residual of at most this many times the noise ...
 const AT_THE_NOISE: f64 = 1.1;
@@ -90,18 +89,6 @@ const TIMID: [f64; 3] = [0.1, 0.03, 0.01];
 pub(super) const STARTS: usize = 4;
 
 impl<T: Twin> Inquiry<'_, T> {
-    /// The twin as given, its own parameters refitted: from where they are given and, where that does not follow, from where windows lead.
-    pub fn recalibrated(&self) -> Hypothesis<T> {
-        let given: Vec<f64> = self.twin.parameters().iter().map(|p| p.nominal).collect();
-        let directly = self.begun(self.twin.clone(), Vec::new(), &given, None, Effort::Thorough);
-        // What starts in the middle of a closed loop lacks what its controller remembers.
-        let starts_anywhere = self.twin.clock() != Clock::Event && !self.twin.in_closed_loop();
-        if !starts_anywhere || self.evidence.window.is_some() || directly.within(KEEPS_UP) {
-            return directly;
-        }
-        approached(self, &given, directly)
-    }
-
     /// `parent` with what was `screened` added, fitted from `most` of the starts that screening liked best.
     pub fn extended(&self, parent: &Hypothesis<T>, screened: &Screened, most: usize, effort: Effort) -> Hypothesis<T> {
         let twin = parent.twin.with(&self.candidates[screened.number]);

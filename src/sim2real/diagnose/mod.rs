@@ -1,7 +1,7 @@
 //! Locate, name, model, prove: what a simulator left out, found from recordings.
 //!
 //! One file a step, in this order: `evidence` divides the recordings and finds their `noise`; a `hypothesis` is the
-//! twin with mechanisms added, and the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
+//! twin with mechanisms added, and `approach` finds the first of them, with none, its own parameters refitted; `screen` ranks mechanisms
 //! by their signatures; `select` fits and compares sets of them, `weigh`ed by the evidence that `whiteness` counts, and `forms` finds
 //! for each the form that does best beside the others; `rivals` looks for other names, `carry_over` asks the one recording of
 //! what explains little in the other, and `confidence` says how sure one is;
