@@ -267,3 +267,29 @@ impl Machine {
         State { position: state.velocity, velocity, motor_position: rubbing, motor_velocity, driver, load }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conceal::benchmark::recipe::{FOREIGN, KNOWN, Recipe};
+    use crate::conceal::benchmark::scene::Scales;
+
+    /// A state that nobody integrates stays as it was, and its effect is none.
+    #[test]
+    fn whatever_has_a_state_is_integrated() {
+        let arm = Arm { linear: false, inertia: 0.1, viscous_friction: 0.2, gravity_torque: 2.5, gain: 1.0 };
+        let commands = (0..2_500).map(|i| (f64::from(i) * 0.011).sin()).collect();
+        let scales = Scales::of(arm, &Drive { commands, sample: 0.004, start: 0.0, speed: 0.0 });
+        let state = State { position: 0.3, velocity: 1.1, driver: [0.1; 5], load: [0.02; 5], ..State::default() };
+        let moves = |id: &'static str| {
+            let recipe = Recipe::draw(id, &mut Seed(3).stream(id));
+            let machine = Machine::new(arm, &[recipe.at((recipe.range.0 * recipe.range.1).sqrt(), &scales)]);
+            let rate = machine.rates(&state, 0.7, 1.0);
+            let moves = rate.driver.iter().chain(&rate.load).any(|rate| *rate != 0.0);
+            assert!(!moves || machine.remembers, "{id}");
+            moves
+        };
+        let moving = KNOWN.into_iter().chain(FOREIGN).filter(|id| moves(id)).count();
+        assert!(moving >= 6, "{moving}: friction, hysteresis, a lag, a slewing driver, heat, a relaxing spring");
+    }
+}

@@ -14,7 +14,7 @@ use crate::sim2real::{Clock, Twin};
 const SHORT: f64 = 24.0;
 /// ... and then, from where these lead, into so many.
 const LONG: f64 = 6.0;
-/// Where the short ones are followed, they are joined to so many, one after the other.
+/// Where the short ones are followed, they are joined to so many, one after the other, and at last to the whole.
 const JOINED: [f64; 3] = [12.0, 6.0, 3.0];
 
 impl<T: Twin> Inquiry<'_, T> {
@@ -52,8 +52,9 @@ fn better<T>(one: Hypothesis<T>, other: Hypothesis<T>) -> Hypothesis<T> {
 /// Where a part begins: its recording and row, and the initial state found there.
 type Begun = (usize, usize, Vec<f64>);
 
-/// A free run that goes on from `short` windows, of which two at a time become one that starts as the first of them did: by then the
-/// state it starts from is known far better than its samples tell. None where what is joined is not followed any longer.
+/// A free run that goes on from `short` windows, of which two at a time become one (of the last three, all) that starts as the first of
+/// them did: by then the state it starts from is known far better than its samples tell. None where what is joined is not followed any
+/// longer.
 fn joined<T: Twin>(inquiry: &Inquiry<'_, T>, short: (Hypothesis<T>, Vec<Begun>)) -> Option<Hypothesis<T>> {
     let follows = |(fitted, begun): (Hypothesis<T>, Vec<Begun>)| fitted.within(KEEPS_UP).then_some((fitted, begun));
     let longest = JOINED
@@ -72,13 +73,13 @@ fn in_windows<T: Twin>(
 ) -> (Hypothesis<T>, Vec<Begun>) {
     let evidence = inquiry.evidence.in_windows(count);
     let there = Inquiry { evidence: &evidence, ..*inquiry };
-    let there = begun_from(&there, values, before);
-    let states = evidence.compared.iter().zip(&there.fit.state.values);
+    let fitted = begun_from(&there, values, before);
+    let states = evidence.compared.iter().zip(&fitted.fit.state.values);
     let begun = states.map(|(part, state)| (identity(part.recording), part.rows.start, state.clone())).collect();
-    (there, begun)
+    (fitted, begun)
 }
 
-/// The same to what the inquiry compares.
+/// The same, fitted to what the inquiry compares.
 fn begun_from<T: Twin>(inquiry: &Inquiry<'_, T>, values: &[f64], before: &[Begun]) -> Hypothesis<T> {
     let parts = &inquiry.evidence.compared;
     let mut state: State = inquiry.evidence.initial_state(&inquiry.problem(inquiry.twin, parts));

@@ -72,7 +72,7 @@ impl<T: Twin> Selection<T> {
         let whole = || (!self.selected.added.is_empty()).then(|| inquiry.refitted(&self.selected));
         let (recalibrated, whole) = rayon::join(|| inquiry.refitted(&self.recalibrated), whole);
         let Some(whole) = whole else { return self.with_set((recalibrated.clone(), recalibrated, Vec::new())) };
-        // Where it stands with longer steps nearly everything stands with these.
+        // What each is needed for with longer steps it is hardly ever not with these: only then is the set chosen anew.
         let without: Vec<Hypothesis<T>> = match self.without.as_slice() {
             [_] => vec![recalibrated.clone()],
             several => several.par_iter().map(|less| inquiry.refitted(less)).collect(),
