@@ -24,7 +24,7 @@ mod scale;
 mod thermal_derating;
 mod velocity_filter;
 #[cfg(test)]
-mod wire;
+pub(super) mod wire;
 
 use std::fmt;
 

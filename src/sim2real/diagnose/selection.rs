@@ -129,7 +129,57 @@ fn one_more(more: &[&str], set: &[&str]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::super::evidence::Evidence;
     use super::*;
+    use crate::sim2real::identify::Effort;
+    use crate::sim2real::mechanism::wire::Wire;
+    use crate::sim2real::mechanism::{Bias, Drift};
+    use crate::sim2real::{Assembly, Measured, Recording, Registry, Seed, Simulator};
+
+    const SENSOR: Registry<Wire> = &[&Bias, &Drift { rate: None }];
+
+    /// What is selected of a bias and a drift, both of them fitted with other steps, once these are fitted to what a sensor that wanders by
+    /// `rate` made of nothing.
+    fn refitted(rate: f64) -> Vec<&'static str> {
+        let mut rng = Seed(7).stream("noise");
+        let time: Vec<f64> = (0..2_000).map(|i| 0.01 * f64::from(i)).collect();
+        let read = |t: &f64| -> f64 {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            0.1 + rate * t + 0.01 * noise
+        };
+        let samples = time.iter().map(read).map(Some).collect();
+        let measured = vec![Measured { channel: "signal".into(), unit: "rad".into(), samples }];
+        let recordings = [Recording { name: "still".into(), time, stimulus: (), measured }];
+        let twin = Assembly::new(Wire, SENSOR);
+        let evidence = Evidence::divide(&twin, &recordings, &[]);
+        let candidates = twin.candidates(&recordings);
+        let inquiry = Inquiry { twin: &twin, candidates: &candidates, evidence: &evidence, seed: Seed(0) };
+        let number = |name: &str| candidates.iter().position(|candidate| candidate.about.name == name).unwrap();
+        let of = |names: &[&str]| {
+            let added: Vec<usize> = names.iter().map(|name| number(name)).collect();
+            let twin = inquiry.with(&added);
+            let given: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).collect();
+            inquiry.begun(twin, added, &given, None, Effort::Thorough)
+        };
+        let selection = Selection {
+            recalibrated: of(&[]),
+            selected: of(&["bias", "drift"]),
+            without: vec![of(&["drift"]), of(&["bias"])],
+            fitted: Vec::new(),
+            scores: Vec::new(),
+        };
+        let refitted = selection.refitted(&inquiry);
+        assert_eq!(refitted.without.len(), refitted.selected.added.len());
+        refitted.selected.added.iter().map(|number| candidates[*number].about.name).collect()
+    }
+
+    #[test]
+    fn what_other_steps_do_not_need_is_left_out() {
+        assert_eq!(refitted(0.01), ["bias", "drift"]);
+        assert_eq!(refitted(0.0), ["bias"], "a sensor that does not wander");
+    }
 
     #[test]
     fn one_more_has_all_the_others() {

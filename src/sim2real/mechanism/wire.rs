@@ -8,11 +8,11 @@ use crate::sim2real::{
 
 /// Two channels, a signal and its rate of change.
 #[derive(Clone)]
-pub(super) struct Wire;
+pub(in crate::sim2real) struct Wire;
 
 /// A command that holds until the next.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) struct Level(f64);
+pub(in crate::sim2real) struct Level(f64);
 
 impl AsMut<f64> for Level {
     fn as_mut(&mut self) -> &mut f64 {
@@ -55,7 +55,9 @@ impl Dynamics<Wire> for () {
 
     fn advance(&self, _: Tick, _: &mut [()], _: &[()], _: &[Level], _: &[()]) {}
 
-    fn observe(&self, _: &[()], _: &mut [[f64; 2]]) {}
+    fn observe(&self, _: &[()], seen: &mut [[f64; 2]]) {
+        seen.fill([0.0; 2]);
+    }
 }
 
 impl Plant for Wire {
