@@ -11,6 +11,7 @@ mod identify;
 mod joint_input;
 mod lanes;
 mod mechanisms;
+mod once_misjudged;
 mod once_wrong;
 mod processes;
 mod rates_of_readings;

@@ -3,7 +3,7 @@
 use super::Comparison;
 use super::diagnosis::{ChannelFit, Effect, Score, Verdict};
 use super::held_out::{
-    FAR_ABOVE_THE_NOISE, FORM_ERROR, HARDLY_ABOVE, better, confirms, fails_unseen, far_off, grown, held_out_remainder,
+    FAR_ABOVE_THE_NOISE, FORM_ERROR, HARDLY_ABOVE, better, confirms, fails_unseen, far_off, grown, held_out_remainder, left,
     visible, worse,
 };
 use super::hypothesis::{Hypothesis, Inquiry};
@@ -121,8 +121,18 @@ fn foretold_well(foretold: f64, fits: &[ChannelFit]) -> bool {
 /// The probability that everything named, or one of its rivals each time, is what is missing: the more that is named and
 /// the less sure, the likelier it is that all of it stands for one thing that is in no registry.
 fn library(effects: &[Effect]) -> f64 {
-    let known = |e: &Effect| (e.confidence + e.rivals.iter().map(|r| r.confidence).sum::<f64>()).min(1.0);
     effects.iter().map(known).product()
+}
+
+/// The probability that a name or one of its rivals is right.
+fn known(effect: &Effect) -> f64 {
+    (effect.confidence + effect.rivals.iter().map(|rival| rival.confidence).sum::<f64>()).min(1.0)
+}
+
+/// Whether of several names none is sure, nor has the right one among its rivals: if more than noise is left where they were not fitted, all
+/// of them together stand for something that is in no registry.
+fn none_sure(effects: &[Effect]) -> bool {
+    effects.len() > 1 && effects.iter().all(|effect| known(effect) < CERTAIN_UNCONFIRMED)
 }
 
 /// What of the first misfit may be left for an error of form. What the motion foretells of the rest is physics: it is excused as that of
@@ -177,7 +187,8 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
         };
     }
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
-    let doubtful = findings.sampled && library(effects) < least_likely(effects, unseen);
+    let none_sure = none_sure(effects) && findings.fits.iter().any(|fit| left(fit, &selection.selected));
+    let doubtful = findings.sampled && (none_sure || library(effects) < least_likely(effects, unseen));
     let unexplained = left_over || findings.inexact || findings.sampled && slowly_above(&selection.selected, SLOWLY_LEFT);
     let too_much = findings.remainder > form_error(library(effects), findings.foretold, findings.sampled)
         || foretold_well(findings.foretold, &findings.fits);
@@ -200,7 +211,8 @@ pub(super) fn slowly_above<T>(selected: &Hypothesis<T>, times: f64) -> bool {
 /// What is said where the fitted data show nothing, of what held-out ones show.
 ///
 /// What is clean where it was fitted and off elsewhere was not moved enough to be told. But noise of signals is no louder where a plant is
-/// moved otherwise: what went for noise of another colour, though it is not of one alone, and grows, is something unknown.
+/// moved otherwise: what went for noise of another colour, though it is not of one alone, and grows, is something unknown. So is what
+/// windows do not show and a free run does not follow, if it grows.
 fn unseen_there<T>(selected: &Hypothesis<T>, findings: &Findings) -> Verdict {
     let clean = findings.followed && selected.within(NEAR_THE_NOISE);
     let coloured = selected.misfits.iter().any(|misfit| misfit.level > 1.0 && !misfit.one_colour);
@@ -210,7 +222,8 @@ fn unseen_there<T>(selected: &Hypothesis<T>, findings: &Findings) -> Verdict {
         (true, _) if findings.sampled => Verdict::Unexplained,
         (false, true) if clean && coloured => Verdict::Unexplained,
         (false, true) if clean => Verdict::NotExcited,
-        _ => Verdict::NoMismatch,
+        (false, true) => Verdict::Unexplained,
+        (false, false) | (true, _) => Verdict::NoMismatch,
     }
 }
 
@@ -267,6 +280,15 @@ mod tests {
         assert_eq!(library(&[effect(0.6, &[0.6])]), 1.0);
         assert!(library(&[effect(0.9, &[]), effect(0.3, &[]), effect(0.2, &[])]) < HARDLY_THE_LIBRARY);
         assert_eq!(library(&[]), 1.0);
+    }
+
+    /// A bent shaft, told as a cogging, an eccentricity and an end stop.
+    #[test]
+    fn of_several_names_one_at_least_is_sure() {
+        assert!(none_sure(&[effect(0.65, &[]), effect(0.63, &[]), effect(0.59, &[])]));
+        assert!(!none_sure(&[effect(0.85, &[]), effect(0.14, &[])]), "one is");
+        assert!(!none_sure(&[effect(0.57, &[0.3]), effect(0.24, &[])]), "or has the right one beside it");
+        assert!(!none_sure(&[effect(0.6, &[])]), "a single name is asked for less");
     }
 
     #[test]
@@ -360,6 +382,13 @@ mod tests {
             Verdict::NotExcited,
             "noise, and a limit that is hardly reached"
         );
+        let astray = |held_out: f64| Findings { followed: false, ..findings(held_out) };
+        assert_eq!(
+            unseen_there(&white, &astray(7.6)),
+            Verdict::Unexplained,
+            "a supply that sags, which windows do not show"
+        );
+        assert_eq!(unseen_there(&white, &astray(1.2)), Verdict::NoMismatch);
         assert!(slowly_above(&leaving(1.4, 400.0), SLOWLY_ABOVE), "a base that shakes a little");
         assert!(!slowly_above(&leaving(1.4, 3_000.0), SLOWLY_ABOVE), "and noise that hardly remembers itself");
     }

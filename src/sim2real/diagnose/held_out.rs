@@ -5,6 +5,7 @@ use super::diagnosis::ChannelFit;
 use super::hypothesis::Hypothesis;
 use super::needed::INFORMATIVE_ROWS;
 use super::remainder::MOSTLY_LEFT;
+use super::weigh::ABOVE_NOISE;
 use super::whiteness::ChannelMisfit;
 
 /// A remainder above this part of the first misfit is more than an error of form.
@@ -44,9 +45,19 @@ pub(super) fn above_the_noise(fit: &ChannelFit) -> bool {
 
 /// The same beyond chance: of noise that remembers itself, few rows are independent, and one recording may have more of it than another.
 pub(super) fn visible<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
+    above_the_noise(fit) && beyond_chance(fit.recalibrated_rmse, fit, selected)
+}
+
+/// Whether the trued twin leaves so much more than the noise on held-out data, beyond chance, that what was named may not be all.
+pub(super) fn left<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
+    let noise = fit.noise_floor.powi(2);
+    fit.trued_rmse.powi(2) > ABOVE_NOISE * noise && beyond_chance(fit.trued_rmse, fit, selected)
+}
+
+fn beyond_chance<T>(rmse: f64, fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
     let coloured = |misfit: &&ChannelMisfit| misfit.channel == fit.channel && misfit.level > 1.0 && misfit.one_colour;
     let by_chance = selected.misfits.iter().find(coloured).map_or(1.0, by_chance);
-    above_the_noise(fit) && fit.recalibrated_rmse.powi(2) > by_chance * fit.noise_floor.powi(2)
+    rmse.powi(2) > by_chance * fit.noise_floor.powi(2)
 }
 
 /// What noise leaves at the most in one recording, times what it left in the fitted one, if as much is held out as was fitted.
@@ -136,6 +147,15 @@ pub(super) mod tests {
         assert!(visible(&error(1.3, 1.1), &coloured));
         coloured.misfits[0].one_colour = false;
         assert!(visible(&error(1.2, 1.1), &coloured), "and what has two colours may be no noise");
+    }
+
+    #[test]
+    fn what_names_leave_elsewhere_is_half_as_much_as_noise_and_more() {
+        let white = leaving(1.0, 6_000.0);
+        assert!(left(&error(2.0, 1.36), &white) && !left(&error(2.0, 1.19), &white));
+        let mut coloured = leaving(7.0, 60.0);
+        coloured.misfits[0].level = 7.0;
+        assert!(!left(&error(2.0, 1.36), &coloured), "of so few it may be chance");
     }
 
     #[test]

@@ -36,6 +36,7 @@ mod free_run;
 mod gates;
 mod held_out;
 mod hypothesis;
+mod judged;
 mod locate;
 mod nameless;
 mod needed;
@@ -81,7 +82,10 @@ pub use unread::Unread;
 use nalgebra::DMatrix;
 
 use hypothesis::Inquiry;
+use judged::Judged;
 use prove::Contest;
+use rivals::Place;
+use selection::Selection;
 
 use super::any_twin::{AnyStimulus, AnyTwin, any_recordings};
 use super::{Candidate, ChannelWeight, Clock, Recording, Seed, Signs, Simulator, Twin};
@@ -287,21 +291,23 @@ fn as_stamped(
         (selection, rivals) = (beneath.seen(&inquiry), places);
     }
     selection.mark_accepted(&candidates);
-    let selection = recognize::finished(&inquiry, selection, &mut rivals);
+    let mut selection = recognize::finished(&inquiry, selection, &mut rivals);
     let asked_for = record::asked_for(&inquiry, &selection.selected, recordings);
     progress("proving on held-out data", 0, 1);
-    let in_free_run = |hypothesis| inquiry.in_free_run(hypothesis);
-    let (recalibrated, trued) = rayon::join(|| in_free_run(&selection.recalibrated), || in_free_run(&selection.selected));
-    let given: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).collect();
-    let contest = Contest {
-        nominal: (twin, &given),
-        recalibrated: (twin, &recalibrated.values),
-        trued: (&selection.selected.twin, &trued.values),
-    };
-    let comparisons = prove::compared(&contest, inquiry.evidence, seed);
     let covariates = locate::covariates(&inquiry);
-    let findings = findings::findings(&inquiry, &selection, recordings, (&comparisons, &trued), &covariates);
-    let mut diagnosis = verdict::diagnosis(&inquiry, &selection, &rivals, &findings);
+    let judged = |selection: &Selection<AnyTwin>, places: &[Place]| {
+        judged::judged(&inquiry, selection, places, recordings, &covariates)
+    };
+    let mut judgement = judged(&selection, &rivals);
+    // What held-out data do not confirm does not unsay what is seen without a fit: it is said without it.
+    if found.signs.repeated > 0.0 && judgement.of_fitted_rows_alone() {
+        let unconfirmed = judgement.unconfirmed(&inquiry);
+        rivals.clear();
+        selection = recognize::finished(&inquiry, selection.bare(), &mut rivals);
+        judgement = judged(&selection, &rivals);
+        judgement.diagnosis.checks.notes.push(unconfirmed);
+    }
+    let Judged { comparisons, trued, findings, mut diagnosis } = judgement;
     // What the fit has named already need not be recognized besides.
     let named: Vec<&str> = selection.selected.added.iter().map(|number| candidates[*number].about.name).collect();
     let seen: Vec<&Candidate> = found.of.iter().filter(|c| !named.contains(&c.about.name)).collect();

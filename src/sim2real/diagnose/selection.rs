@@ -94,6 +94,12 @@ impl<T: Twin> Selection<T> {
         self.with_set(pruned(inquiry, &self.recalibrated, vec![self.without[place].clone()]))
     }
 
+    /// The selection with none of its mechanisms: all that was tried remains known.
+    pub fn bare(mut self) -> Self {
+        self.scores.iter_mut().for_each(|score| score.accepted = false);
+        self.with_set((self.recalibrated.clone(), self.recalibrated.clone(), Vec::new()))
+    }
+
     /// The selection with the `place`-th mechanism replaced by candidate `other`, and what is no longer needed left out.
     pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
         let less = &self.without[place];
