@@ -20,7 +20,7 @@ const SLIGHT: f64 = 0.02;
 const NOT_SLIGHT: f64 = 200.0;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
-/// What has more constants loses by no less than this, whatever of them the data leave open: of pairs of a sensor's offset and an eccentric
+/// A law of the same site that has more constants loses by no less than this, whatever of them the data leave open: of pairs of a sensor's offset and an eccentric
 /// disc, each of them the other's rival, 17 were the offset and 11 the disc (six spent test seeds).
 const LONGER: f64 = 1.0;
 /// Rivals that lose by less than this in one form are tried in all.
@@ -292,8 +292,8 @@ fn loss<T: Twin>(
             false => listed.min(loss + WITHIN),
         };
     }
-    // Nor is one that contains nothing of it excluded by constants that these data leave open.
-    let longer = inquiry.twin.clock() != Clock::Event && rival.free() > selected.free();
+    // Nor is one of the same site that contains nothing of it excluded by constants that these data leave open.
+    let longer = inquiry.twin.clock() != Clock::Event && rival.free() > selected.free() && own.site == other.site;
     if longer { listed_as(loss, left_open(inquiry, selected, rival)) } else { loss }
 }
 
