@@ -20,8 +20,8 @@ const SLIGHT: f64 = 0.02;
 const NOT_SLIGHT: f64 = 200.0;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
-/// A law of the same site that has more constants loses by no less than this, whatever of them the data leave open: of pairs of a sensor's offset and an eccentric
-/// disc, each of them the other's rival, 17 were the offset and 11 the disc (six spent test seeds).
+/// A law of the same site that has more constants loses by no less than this, whatever of them the data leave open: where a sensor's offset
+/// and an eccentric disc were each the other's rival, 17 were the offset and 11 the disc (six spent test seeds).
 const LONGER: f64 = 1.0;
 /// Rivals that lose by less than this in one form are tried in all.
 const NEAR: f64 = 3.0 * WITHIN;
