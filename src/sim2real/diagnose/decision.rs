@@ -3,8 +3,8 @@
 use super::Comparison;
 use super::diagnosis::{ChannelFit, Effect, Score, Verdict};
 use super::held_out::{
-    FAR_ABOVE_THE_NOISE, FORM_ERROR, HARDLY_ABOVE, better, confirms, fails_unseen, far_off, grown, held_out_remainder, left,
-    visible, worse,
+    FAR_ABOVE_THE_NOISE, FORM_ERROR, HARDLY_ABOVE, better, confirms, fails_unseen, far_off, grown, held_out_remainder,
+    leaves_more, visible, worse,
 };
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::locate::Covariates;
@@ -121,18 +121,18 @@ fn foretold_well(foretold: f64, fits: &[ChannelFit]) -> bool {
 /// The probability that everything named, or one of its rivals each time, is what is missing: the more that is named and
 /// the less sure, the likelier it is that all of it stands for one thing that is in no registry.
 fn library(effects: &[Effect]) -> f64 {
-    effects.iter().map(known).product()
+    effects.iter().map(right_or_rival).product()
 }
 
 /// The probability that a name or one of its rivals is right.
-fn known(effect: &Effect) -> f64 {
+fn right_or_rival(effect: &Effect) -> f64 {
     (effect.confidence + effect.rivals.iter().map(|rival| rival.confidence).sum::<f64>()).min(1.0)
 }
 
 /// Whether of several names none is sure, nor has the right one among its rivals: if more than noise is left where they were not fitted, all
 /// of them together stand for something that is in no registry.
 fn none_sure(effects: &[Effect]) -> bool {
-    effects.len() > 1 && effects.iter().all(|effect| known(effect) < CERTAIN_UNCONFIRMED)
+    effects.len() > 1 && effects.iter().all(|effect| right_or_rival(effect) < CERTAIN_UNCONFIRMED)
 }
 
 /// What of the first misfit may be left for an error of form. What the motion foretells of the rest is physics: it is excused as that of
@@ -187,7 +187,7 @@ pub(super) fn decide<T>(selection: &Selection<T>, effects: &[Effect], findings: 
         };
     }
     let unseen = findings.sampled && findings.fits.iter().any(fails_unseen);
-    let none_sure = none_sure(effects) && findings.fits.iter().any(|fit| left(fit, &selection.selected));
+    let none_sure = none_sure(effects) && findings.fits.iter().any(|fit| leaves_more(fit, &selection.selected));
     let doubtful = findings.sampled && (none_sure || library(effects) < least_likely(effects, unseen));
     let unexplained = left_over || findings.inexact || findings.sampled && slowly_above(&selection.selected, SLOWLY_LEFT);
     let too_much = findings.remainder > form_error(library(effects), findings.foretold, findings.sampled)
@@ -220,8 +220,7 @@ fn unseen_there<T>(selected: &Hypothesis<T>, findings: &Findings) -> Verdict {
     match (findings.fits.iter().any(far_off), grown) {
         (true, _) if clean => Verdict::NotExcited,
         (true, _) if findings.sampled => Verdict::Unexplained,
-        (false, true) if clean && coloured => Verdict::Unexplained,
-        (false, true) if clean => Verdict::NotExcited,
+        (false, true) if clean && !coloured => Verdict::NotExcited,
         (false, true) => Verdict::Unexplained,
         (false, false) | (true, _) => Verdict::NoMismatch,
     }

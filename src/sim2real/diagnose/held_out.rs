@@ -49,11 +49,12 @@ pub(super) fn visible<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
 }
 
 /// Whether the trued twin leaves so much more than the noise on held-out data, beyond chance, that what was named may not be all.
-pub(super) fn left<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
+pub(super) fn leaves_more<T>(fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
     let noise = fit.noise_floor.powi(2);
     fit.trued_rmse.powi(2) > ABOVE_NOISE * noise && beyond_chance(fit.trued_rmse, fit, selected)
 }
 
+/// Whether an error is larger than what noise that remembers itself may come to in one recording.
 fn beyond_chance<T>(rmse: f64, fit: &ChannelFit, selected: &Hypothesis<T>) -> bool {
     let coloured = |misfit: &&ChannelMisfit| misfit.channel == fit.channel && misfit.level > 1.0 && misfit.one_colour;
     let by_chance = selected.misfits.iter().find(coloured).map_or(1.0, by_chance);
@@ -152,10 +153,10 @@ pub(super) mod tests {
     #[test]
     fn what_names_leave_elsewhere_is_half_as_much_as_noise_and_more() {
         let white = leaving(1.0, 6_000.0);
-        assert!(left(&error(2.0, 1.36), &white) && !left(&error(2.0, 1.19), &white));
+        assert!(leaves_more(&error(2.0, 1.36), &white) && !leaves_more(&error(2.0, 1.19), &white));
         let mut coloured = leaving(7.0, 60.0);
         coloured.misfits[0].level = 7.0;
-        assert!(!left(&error(2.0, 1.36), &coloured), "of so few it may be chance");
+        assert!(!leaves_more(&error(2.0, 1.36), &coloured), "of so few it may be chance");
     }
 
     #[test]

@@ -20,11 +20,11 @@ const SLIGHT: f64 = 0.02;
 const NOT_SLIGHT: f64 = 200.0;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
+/// Rivals that lose by less than this in one form are tried in all.
+const NEAR: f64 = 3.0 * WITHIN;
 /// A law of the same site that has more constants loses by no less than this, whatever of them the data leave open: where a sensor's offset
 /// and an eccentric disc were each the other's rival, 17 were the offset and 11 the disc (six spent test seeds).
 const LONGER: f64 = 1.0;
-/// Rivals that lose by less than this in one form are tried in all.
-const NEAR: f64 = 3.0 * WITHIN;
 /// Other mechanisms fitted in the place of one: those that screening likes best without it, ...
 const BY_SCREEN: usize = 3;
 /// ... and those that stood best when they were tried beside fewer, and as many more that gained no less than this part of what it did.
@@ -297,7 +297,7 @@ fn loss<T: Twin>(
     if longer { listed_as(loss, left_open(inquiry, selected, rival)) } else { loss }
 }
 
-/// What something longer loses of which constants that count for so much are left open.
+/// What a rival with more constants loses, but for what counting those that data leave open charges it too much.
 fn listed_as(loss: f64, open: f64) -> f64 {
     (loss - open).max(LONGER).min(loss)
 }

@@ -174,11 +174,27 @@ mod tests {
             selected: of(&["bias", "drift"]),
             without: vec![of(&["drift"]), of(&["bias"])],
             fitted: Vec::new(),
-            scores: Vec::new(),
+            scores: vec![accepted()],
         };
         let refitted = selection.refitted(&inquiry);
         assert_eq!(refitted.without.len(), refitted.selected.added.len());
-        refitted.selected.added.iter().map(|number| candidates[*number].about.name).collect()
+        let chosen = refitted.selected.added.clone();
+        let bare = refitted.bare();
+        assert!(bare.selected.added.is_empty() && bare.without.is_empty() && !bare.scores[0].accepted);
+        chosen.iter().map(|number| candidates[*number].about.name).collect()
+    }
+
+    fn accepted() -> Score {
+        Score {
+            mechanism: "drift".to_owned(),
+            form: "linear".to_owned(),
+            stage: 1,
+            screen: 0.5,
+            survival: 1.0,
+            gain: Some(900.0),
+            accepted: true,
+            excited: true,
+        }
     }
 
     #[test]
