@@ -11,6 +11,7 @@ mod identify;
 mod joint_input;
 mod lanes;
 mod mechanisms;
+mod once_in_free_run;
 mod once_misjudged;
 mod once_wrong;
 mod processes;

@@ -88,16 +88,6 @@ fn a_dead_zone_may_have_any_edge() {
     assert_eq!(names(&tried(1006, 48)), ["dead_zone", "quadratic_drag"]);
 }
 
-/// Windows start afresh so often that hardly anything of a hysteresis is seen in them: what fits them to the noise, and a free run
-/// worse than the hysteresis does, is not what is missing.
-/// Nor is what does a little worse there at more than twice the length.
-#[test]
-fn what_fits_windows_alone_does_not_displace_what_explains_a_free_run() {
-    let trial = tried(1007, 87);
-    assert_eq!(names(&trial), ["hysteresis"]);
-    assert_ne!(trial.verdict, Verdict::Unexplained);
-}
-
 /// A constant load on an axis that forgets nothing moves it as a sensor's drift would: of two that say the same, what is the same at
 /// all times is told first.
 #[test]
@@ -221,15 +211,6 @@ fn what_is_let_go_begins_with_a_swing() {
 fn where_no_promise_is_kept_more_are_tried_in_all_forms() {
     let trial = tried(67, 67);
     assert_eq!((names(&trial), trial.verdict), (vec!["saturation"], Verdict::Named));
-}
-
-/// A free run that parts early leads no fit back; windows that start afresh do.
-#[test]
-fn windows_bring_a_twin_near_what_it_does_not_follow() {
-    for (index, right) in [(74, vec!["observation_delay"]), (152, vec!["cogging", "end_stop"])] {
-        let trial = tried(67, index);
-        assert_eq!((names(&trial), trial.verdict), (right, Verdict::Named), "case {index}");
-    }
 }
 
 /// A constant load that creeps a little: what its law was off by was told as teeth of a motor.
@@ -357,22 +338,6 @@ fn what_leaves_far_less_is_gone_on_from_though_it_gains_nothing() {
     assert_eq!(names(&tried(1025, 166)), ["drift", "rate_limit"]);
 }
 
-/// Cogging on an axis that stays where it comes to rest: the winding's warmth shows in free run alone, and there no fit finds it but
-/// the one that windows began.
-#[test]
-#[ignore = "takes half a minute: `./x test --test robot -- --ignored`"]
-fn what_windows_fitted_for_nothing_begins_a_free_run() {
-    assert_eq!(names(&tried(78, 8)), ["cogging", "thermal_derating"]);
-}
-
-/// Cogging alone, which windows show; followed from the start on, the axis came to the right tooth with a compliance in its drive, too,
-/// of which windows show nothing.
-#[test]
-#[ignore = "takes half a minute: `./x test --test robot -- --ignored`"]
-fn what_brings_a_free_run_to_the_right_tooth_by_chance_is_not_named() {
-    assert_eq!(names(&tried(76, 7)), ["cogging"]);
-}
-
 /// A spring that hardens, beside friction that is most of the misfit: laws that gained more alone were its rivals, all of them frictions,
 /// and it was named a wrong scale with nothing beside it.
 #[test]
@@ -396,11 +361,4 @@ fn what_acts_before_what_was_found_first_is_found_there() {
 #[test]
 fn what_a_form_is_off_by_is_not_what_a_wider_law_completes() {
     assert_eq!(names(&tried(1026, 351)), ["coulomb_friction"]);
-}
-
-/// Teeth of a motor on an axis that adds up what they do: a free run came to another number of them, and left a little that is slower than
-/// noise; windows tell the number, and hardly that there are any.
-#[test]
-fn what_gains_too_little_on_windows_begins_a_free_run() {
-    assert_eq!(names(&tried(1026, 360)), ["cogging"]);
 }

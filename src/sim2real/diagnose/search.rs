@@ -26,10 +26,14 @@ pub(super) fn searched<T: Twin>(
     let as_given = (inquiry.twin, given.as_slice());
     let anew = |inquiry: &Inquiry<'_, T>| select::select(inquiry, inquiry.recalibrated(), progress);
     let (selection, places) = settled(inquiry, as_given, anew, progress);
-    if evidence.window.is_none() || explains(&selection) {
+    if evidence.window.is_none() {
         return (selection, places, false);
     }
     let in_windows = Inquiry { evidence, ..*inquiry };
+    let upheld = free_run::upheld(&in_windows, (inquiry, &selection));
+    if explains(&selection) && upheld {
+        return (selection, places, false);
+    }
     let (on_windows, places_there) = settled(&in_windows, as_given, anew, progress);
     // What windows have found may be near enough for a free run to tell the rest.
     let found = (&on_windows.selected.twin, on_windows.selected.fit.values.as_slice());
@@ -42,6 +46,7 @@ pub(super) fn searched<T: Twin>(
     let there = |rest: &Selection<T>| enough(rest) && free_run::bears_out((&in_windows, &on_windows), (inquiry, rest));
     match rest.filter(|(rest, _)| there(rest)) {
         Some((rest, places)) => (rest, places, false),
+        None if !upheld && on_windows.complete() => (on_windows, places_there, true),
         None if slow || free_run::worse_than((&in_windows, &on_windows), &selection) => (selection, places, false),
         None => (on_windows, places_there, true),
     }
