@@ -335,13 +335,12 @@ impl<P: Plant> Assembly<P> {
                 let known =
                     recordings.iter().all(|r| applies(&r.stimulus)) && mechanism.told_by(form_index).is_none_or(told);
                 if known && self.plant.open_to(mechanism.site(form_index)) && mechanism.followed(form_index) {
-                    let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
-                    let (ages, seldom) = (mechanism.ages(), mechanism.seldom());
-                    let bounds = bounds(&widest[form_index]);
                     // Beside what is modelled already it differs from the first.
                     let others = mechanism.beside(form_index);
                     let beside = if others.iter().any(|other| modelled.contains(other)) { &[] } else { others };
-                    candidates.push(Candidate { about, form, form_index, finishing, general, beside, ages, seldom, bounds });
+                    let plain = candidate(*mechanism, form, form_index, bounds(&widest[form_index]));
+                    let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
+                    candidates.push(Candidate { finishing, general, beside, ..plain });
                 }
             }
         }
@@ -383,6 +382,13 @@ fn measured<S>(recordings: &[Recording<S>], channel: Option<&Channel>) -> bool {
 /// Lowest and highest value of each parameter of `form`.
 fn bounds(form: &Form) -> Vec<[f64; 2]> {
     form.parameters.iter().map(|parameter| [parameter.lower, parameter.upper]).collect()
+}
+
+/// `form` of `mechanism`, number `form_index` of its forms, tried by itself and in its place among others.
+fn candidate<P: Plant>(mechanism: &dyn Mechanism<P>, form: Form, form_index: usize, bounds: Vec<[f64; 2]>) -> Candidate {
+    let (finishing, general, beside) = (false, false, &[][..]);
+    let (about, ages, seldom, unsteady) = (mechanism.about(), mechanism.ages(), mechanism.seldom(), mechanism.unsteady());
+    Candidate { about, form, form_index, finishing, general, beside, ages, seldom, unsteady, bounds }
 }
 
 impl<P: Plant> Twin for Assembly<P> {
@@ -440,9 +446,8 @@ impl<P: Plant> Twin for Assembly<P> {
             for (form_index, mut form) in mechanism.forms(&Default::default()).into_iter().enumerate() {
                 let Some(values) = mechanism.recognized(form_index, signs) else { continue };
                 form.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.nominal = value);
-                let (about, ages, seldom) = (mechanism.about(), mechanism.ages(), mechanism.seldom());
-                let (finishing, general, beside, bounds) = (false, false, &[][..], bounds(&form));
-                found.push(Candidate { about, form, form_index, finishing, general, beside, ages, seldom, bounds });
+                let bounds = bounds(&form);
+                found.push(candidate(*mechanism, form, form_index, bounds));
             }
         }
         found

@@ -181,6 +181,11 @@ pub trait Mechanism<P: Plant>: Send + Sync {
     fn seldom(&self) -> bool {
         false
     }
+    /// Whether it does not do quite the same to one command as to the next, as messages of a bus are not equally late: it pushes what adds up
+    /// by chance, and no recording tells by how much.
+    fn unsteady(&self) -> bool {
+        false
+    }
     /// Whether it is a matter of how a recording was made, and nothing that a simulator leaves out: it is fitted where the recordings ask
     /// for it, and never named.
     fn of_the_record(&self) -> bool {

@@ -132,6 +132,8 @@ pub struct Candidate {
     pub ages: bool,
     /// Whether its law is met less often by itself than others are.
     pub seldom: bool,
+    /// Whether it does not do quite the same to one command as to the next.
+    pub unsteady: bool,
     /// Lowest and highest value that each of its parameters may have at all, beyond what goes by its name.
     pub bounds: Vec<[f64; 2]>,
 }

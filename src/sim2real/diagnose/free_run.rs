@@ -73,8 +73,6 @@ pub(super) fn upheld<T: Twin>(in_windows: &Inquiry<'_, T>, free_run: (&Inquiry<'
 /// Whether what `whole` has beyond `less`, both fitted in free run, is there: windows gain by it, too, or it carries over and no more is left
 /// than noise, or than windows leave.
 ///
-/// Where no command is as late as the one before, each pushes a plant that adds up a little too far or not far enough, which no law
-/// foretells: a free run goes astray by it, and teeth or a stop may lead it back by chance. Windows start afresh.
 fn adds<T: Twin>(
     in_windows: &Inquiry<'_, T>,
     in_free_run: &Inquiry<'_, T>,
@@ -87,14 +85,20 @@ fn adds<T: Twin>(
             && carries_over(in_free_run, less, whole)
 }
 
+/// Whether windows show nothing but what pushes a plant by chance: where no command is as late as the one before, each pushes one that adds up
+/// a little too far or not far enough, which no law foretells. A free run goes astray by it, and teeth or a stop may lead it back.
+pub(super) fn led_astray<T: Twin>(in_windows: &Inquiry<'_, T>, selection: &Selection<T>) -> bool {
+    selection.complete() && selection.selected.added.iter().any(|number| in_windows.candidates[*number].unsteady)
+}
+
 /// Mean square of what is left, in units of the noise.
 fn mean_square<T>(hypothesis: &Hypothesis<T>) -> f64 {
     squares(hypothesis) / hypothesis.misfits.iter().map(|m| m.count).sum::<usize>().max(1) as f64
 }
 
-/// Whether what free run `found` beside what was selected on windows is there: that keeps up with the recordings by itself, and what was
-/// found [adds](adds) to it, or windows gain by what was found, too. Where a plant can come to rest in one place or in the next, whatever
-/// moves it a little may bring it to the right one by chance.
+/// Whether what free run `found` beside what was selected on windows is there: that keeps up with the recordings by itself, and to what
+/// leads astray what was found [adds](adds); or windows gain by what was found, too. Where a plant can come to rest in one place or in the
+/// next, whatever moves it a little may bring it to the right one by chance.
 pub(super) fn bears_out<T: Twin>(
     windows: (&Inquiry<'_, T>, &Selection<T>),
     free_run: (&Inquiry<'_, T>, &Selection<T>),
@@ -105,7 +109,8 @@ pub(super) fn bears_out<T: Twin>(
         return true;
     }
     let alone = in_free_run.refitted_afresh(&selection.selected);
-    alone.within(KEEPS_UP) && adds(in_windows, in_free_run, &alone, &found.selected)
+    let adds = || !led_astray(in_windows, selection) || adds(in_windows, in_free_run, &alone, &found.selected);
+    alone.within(KEEPS_UP) && adds()
         || gain(in_windows, &selection.selected, &in_windows.refitted_afresh(&found.selected)) > 0.0
 }
 

@@ -377,8 +377,8 @@ mod tests {
         let bounds = parameters.iter().map(|p| [p.lower, p.upper]).collect();
         let form = Form { name: if general { "wide" } else { "plain" }, parameters };
         let form_index = usize::from(general);
-        let (finishing, beside, ages, seldom) = (false, &[][..], false, false);
-        Candidate { about, form, form_index, finishing, general, beside, ages, seldom, bounds }
+        let (finishing, beside, ages, seldom, unsteady) = (false, &[][..], false, false, false);
+        Candidate { about, form, form_index, finishing, general, beside, ages, seldom, unsteady, bounds }
     }
 
     #[test]

@@ -35,6 +35,10 @@ pub(super) fn searched<T: Twin>(
         return (selection, places, false);
     }
     let (on_windows, places_there) = settled(&in_windows, as_given, anew, progress);
+    let astray = !upheld && free_run::led_astray(&in_windows, &on_windows);
+    if explains(&selection) && !astray {
+        return (selection, places, false);
+    }
     // What windows have found may be near enough for a free run to tell the rest.
     let found = (&on_windows.selected.twin, on_windows.selected.fit.values.as_slice());
     let gone_on = |inquiry: &Inquiry<'_, T>| select::resumed(inquiry, &on_windows, progress);
@@ -46,7 +50,7 @@ pub(super) fn searched<T: Twin>(
     let there = |rest: &Selection<T>| enough(rest) && free_run::bears_out((&in_windows, &on_windows), (inquiry, rest));
     match rest.filter(|(rest, _)| there(rest)) {
         Some((rest, places)) => (rest, places, false),
-        None if !upheld && on_windows.complete() => (on_windows, places_there, true),
+        None if astray => (on_windows, places_there, true),
         None if slow || free_run::worse_than((&in_windows, &on_windows), &selection) => (selection, places, false),
         None => (on_windows, places_there, true),
     }

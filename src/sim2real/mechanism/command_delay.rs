@@ -52,6 +52,11 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
         }
     }
 
+    // Buses, drivers and schedulers have other things to do, now more and now less.
+    fn unsteady(&self) -> bool {
+        true
+    }
+
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = self.where_fits_begin(typical);
         let delay = |name| {
