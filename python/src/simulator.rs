@@ -264,17 +264,7 @@ impl ScriptedSimulator {
     ) -> PyResult<Self> {
         let candidate = |(id, parameters): (String, Vec<ParameterRow>)| {
             let form = Form { name: "", parameters: parameters.into_iter().map(parameter).collect() };
-            Ok(Candidate {
-                about: about(py, &id)?,
-                bounds: form.parameters.iter().map(|parameter| [parameter.lower, parameter.upper]).collect(),
-                form,
-                form_index: 0,
-                finishing: false,
-                general: false,
-                beside: &[],
-                ages: false,
-                seldom: false,
-            })
+            Ok(Candidate::new(about(py, &id)?, form))
         };
         let parameters: Vec<Parameter> = parameters.into_iter().map(parameter).collect();
         let initial = initial.into_iter().map(|(name, unit, value, channel, derivative, std)| Initial {

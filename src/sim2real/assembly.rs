@@ -338,9 +338,11 @@ impl<P: Plant> Assembly<P> {
                     // Beside what is modelled already it differs from the first.
                     let others = mechanism.beside(form_index);
                     let beside = if others.iter().any(|other| modelled.contains(other)) { &[] } else { others };
-                    let plain = candidate(*mechanism, form, form_index, bounds(&widest[form_index]));
+                    let widest = &widest[form_index].parameters;
+                    let bounds = widest.iter().map(|parameter| [parameter.lower, parameter.upper]).collect();
+                    let plain = candidate(*mechanism, form, form_index);
                     let (finishing, general) = (mechanism.finishing(form_index), mechanism.general(form_index));
-                    candidates.push(Candidate { finishing, general, beside, ..plain });
+                    candidates.push(Candidate { finishing, general, beside, bounds, ..plain });
                 }
             }
         }
@@ -379,16 +381,10 @@ fn measured<S>(recordings: &[Recording<S>], channel: Option<&Channel>) -> bool {
     recordings.iter().any(own)
 }
 
-/// Lowest and highest value of each parameter of `form`.
-fn bounds(form: &Form) -> Vec<[f64; 2]> {
-    form.parameters.iter().map(|parameter| [parameter.lower, parameter.upper]).collect()
-}
-
-/// `form` of `mechanism`, number `form_index` of its forms, tried by itself and in its place among others.
-fn candidate<P: Plant>(mechanism: &dyn Mechanism<P>, form: Form, form_index: usize, bounds: Vec<[f64; 2]>) -> Candidate {
-    let (finishing, general, beside) = (false, false, &[][..]);
-    let (about, ages, seldom, unsteady) = (mechanism.about(), mechanism.ages(), mechanism.seldom(), mechanism.unsteady());
-    Candidate { about, form, form_index, finishing, general, beside, ages, seldom, unsteady, bounds }
+/// `form` of `mechanism`, number `form_index` of its forms, tried by itself.
+fn candidate<P: Plant>(mechanism: &dyn Mechanism<P>, form: Form, form_index: usize) -> Candidate {
+    let (ages, seldom, unsteady) = (mechanism.ages(), mechanism.seldom(), mechanism.unsteady());
+    Candidate { form_index, ages, seldom, unsteady, ..Candidate::new(mechanism.about(), form) }
 }
 
 impl<P: Plant> Twin for Assembly<P> {
@@ -446,8 +442,7 @@ impl<P: Plant> Twin for Assembly<P> {
             for (form_index, mut form) in mechanism.forms(&Default::default()).into_iter().enumerate() {
                 let Some(values) = mechanism.recognized(form_index, signs) else { continue };
                 form.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.nominal = value);
-                let bounds = bounds(&form);
-                found.push(candidate(*mechanism, form, form_index, bounds));
+                found.push(candidate(*mechanism, form, form_index));
             }
         }
         found

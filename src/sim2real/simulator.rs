@@ -138,6 +138,26 @@ pub struct Candidate {
     pub bounds: Vec<[f64; 2]>,
 }
 
+impl Candidate {
+    /// The only `form` of a mechanism, of which nothing more is to be said: tried by itself, within the bounds its parameters have.
+    #[must_use]
+    pub fn new(about: About, form: Form) -> Self {
+        let bounds = form.parameters.iter().map(|parameter| [parameter.lower, parameter.upper]).collect();
+        Self {
+            about,
+            form,
+            form_index: 0,
+            finishing: false,
+            general: false,
+            beside: &[],
+            ages: false,
+            seldom: false,
+            unsteady: false,
+            bounds,
+        }
+    }
+}
+
 /// A simulator that can be given mechanisms it lacks.
 pub trait Twin: Simulator + Clone + 'static {
     /// The forms of all mechanisms it could be given and does not model yet, as far as `recordings` can tell of them.

@@ -374,11 +374,8 @@ mod tests {
 
     fn candidate(general: bool, parameters: Vec<Parameter>) -> Candidate {
         let about = About { name: "teeth", site: Site::Plant, title: "", law: "", source: "", remedy: "", contains: &[] };
-        let bounds = parameters.iter().map(|p| [p.lower, p.upper]).collect();
         let form = Form { name: if general { "wide" } else { "plain" }, parameters };
-        let form_index = usize::from(general);
-        let (finishing, beside, ages, seldom, unsteady) = (false, &[][..], false, false, false);
-        Candidate { about, form, form_index, finishing, general, beside, ages, seldom, unsteady, bounds }
+        Candidate { general, form_index: usize::from(general), ..Candidate::new(about, form) }
     }
 
     #[test]
