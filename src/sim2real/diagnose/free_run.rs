@@ -66,22 +66,24 @@ pub(super) fn strays<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, wh
 
 /// Whether each of several effects that were found in free run [is there](adds).
 pub(super) fn upheld<T: Twin>(in_windows: &Inquiry<'_, T>, free_run: (&Inquiry<'_, T>, &Selection<T>)) -> bool {
-    let (inquiry, Selection { selected, without, .. }) = free_run;
-    selected.added.len() < 2 || without.iter().all(|less| adds(in_windows, inquiry, less, selected))
+    let (in_free_run, Selection { selected, without, .. }) = free_run;
+    if selected.added.len() < 2 {
+        return true;
+    }
+    let on_windows = in_windows.refitted_afresh(selected);
+    without.iter().all(|less| adds(in_windows, in_free_run, less, (selected, &on_windows)))
 }
 
-/// Whether what `whole` has beyond `less`, both fitted in free run, is there: windows gain by it, too, or it carries over and no more is left
-/// than noise, or than windows leave.
-///
+/// Whether what `whole` has beyond `less`, both fitted in free run, is there: windows, to which it was fitted afresh, gain by it, too, or it
+/// carries over and no more is left than noise, or than windows leave.
 fn adds<T: Twin>(
     in_windows: &Inquiry<'_, T>,
     in_free_run: &Inquiry<'_, T>,
     less: &Hypothesis<T>,
-    whole: &Hypothesis<T>,
+    (whole, on_windows): (&Hypothesis<T>, &Hypothesis<T>),
 ) -> bool {
-    let there = in_windows.refitted_afresh(whole);
-    gain(in_windows, &in_windows.refitted_afresh(less), &there) > 0.0
-        || (whole.within(NO_MORE) || mean_square(whole) <= NO_MORE * mean_square(&there))
+    gain(in_windows, &in_windows.refitted_afresh(less), on_windows) > 0.0
+        || (whole.within(NO_MORE) || mean_square(whole) <= NO_MORE * mean_square(on_windows))
             && carries_over(in_free_run, less, whole)
 }
 
@@ -109,9 +111,10 @@ pub(super) fn bears_out<T: Twin>(
         return true;
     }
     let alone = in_free_run.refitted_afresh(&selection.selected);
-    let adds = || !led_astray(in_windows, selection) || adds(in_windows, in_free_run, &alone, &found.selected);
-    alone.within(KEEPS_UP) && adds()
-        || gain(in_windows, &selection.selected, &in_windows.refitted_afresh(&found.selected)) > 0.0
+    let on_windows = in_windows.refitted_afresh(&found.selected);
+    let whole = (&found.selected, &on_windows);
+    let adds = || !led_astray(in_windows, selection) || adds(in_windows, in_free_run, &alone, whole);
+    alone.within(KEEPS_UP) && adds() || gain(in_windows, &selection.selected, &on_windows) > 0.0
 }
 
 /// Whether what was selected on windows does so much worse in free run than what was selected there, or so much as worse at greater
