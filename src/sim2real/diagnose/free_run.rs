@@ -2,10 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::carry_over::carries_over;
 use super::hypothesis::{Hypothesis, Inquiry, KEEPS_UP};
 use super::selection::Selection;
-use super::weigh::{ABOVE_NOISE, ACCEPT, gain, lead, squares};
+use super::weigh::{ABOVE_NOISE, ACCEPT, gain, lead};
 use crate::sim2real::Twin;
 
 /// Of so many hypotheses that come near the best on windows, the one that does best in free run is taken.
@@ -14,9 +13,6 @@ const NEAR_BEST: usize = 8;
 const STRAYS: f64 = 1.5;
 /// A free run that leaves no more than so many times the noise knows what windows may have missed.
 const HARDLY_MORE: f64 = 2.0;
-/// What is there leaves no more than so many times the noise in free run, or what it leaves of windows: 1.17 and 1.35 times as much was left
-/// with teeth and with a stop that were not there.
-const NO_MORE: f64 = 1.1;
 
 /// Puts first, of the hypotheses that come near the best and are no longer, the one that does best in free run, where windows
 /// were compared; what goes astray there beside `parent`, on which all build, is left out.
@@ -64,27 +60,13 @@ pub(super) fn strays<T: Twin>(inquiry: &Inquiry<'_, T>, less: &Hypothesis<T>, wh
     }
 }
 
-/// Whether each of several effects that were found in free run [is there](adds).
-pub(super) fn upheld<T: Twin>(in_windows: &Inquiry<'_, T>, free_run: (&Inquiry<'_, T>, &Selection<T>)) -> bool {
-    let (in_free_run, Selection { selected, without, .. }) = free_run;
-    if selected.added.len() < 2 {
+/// Whether windows gain by each of several effects that were found in free run.
+pub(super) fn upheld<T: Twin>(in_windows: &Inquiry<'_, T>, found: &Selection<T>) -> bool {
+    if found.selected.added.len() < 2 {
         return true;
     }
-    let on_windows = in_windows.refitted_afresh(selected);
-    without.iter().all(|less| adds(in_windows, in_free_run, less, (selected, &on_windows)))
-}
-
-/// Whether what `whole` has beyond `less`, both fitted in free run, is there: windows, to which it was fitted afresh, gain by it, too, or it
-/// carries over and no more is left than noise, or than windows leave.
-fn adds<T: Twin>(
-    in_windows: &Inquiry<'_, T>,
-    in_free_run: &Inquiry<'_, T>,
-    less: &Hypothesis<T>,
-    (whole, on_windows): (&Hypothesis<T>, &Hypothesis<T>),
-) -> bool {
-    gain(in_windows, &in_windows.refitted_afresh(less), on_windows) > 0.0
-        || (whole.within(NO_MORE) || mean_square(whole) <= NO_MORE * mean_square(on_windows))
-            && carries_over(in_free_run, less, whole)
+    let whole = in_windows.refitted_afresh(&found.selected);
+    found.without.iter().all(|less| gain(in_windows, &in_windows.refitted_afresh(less), &whole) > 0.0)
 }
 
 /// Whether windows show nothing but what pushes a plant by chance: where no command is as late as the one before, each pushes one that adds up
@@ -93,28 +75,19 @@ pub(super) fn led_astray<T: Twin>(in_windows: &Inquiry<'_, T>, selection: &Selec
     selection.complete() && selection.selected.added.iter().any(|number| in_windows.candidates[*number].unsteady)
 }
 
-/// Mean square of what is left, in units of the noise.
-fn mean_square<T>(hypothesis: &Hypothesis<T>) -> f64 {
-    squares(hypothesis) / hypothesis.misfits.iter().map(|m| m.count).sum::<usize>().max(1) as f64
-}
-
-/// Whether what free run `found` beside what was selected on windows is there: that keeps up with the recordings by itself, and to what
-/// leads astray what was found [adds](adds); or windows gain by what was found, too. Where a plant can come to rest in one place or in the
-/// next, whatever moves it a little may bring it to the right one by chance.
+/// Whether what free run `found` beside what was selected on windows is there: that keeps up with the recordings by itself, and nothing leads
+/// it [astray](led_astray), or windows gain by what was found, too. Where a plant can come to rest in one place or in the next, whatever
+/// moves it a little may bring it to the right one by chance.
 pub(super) fn bears_out<T: Twin>(
     windows: (&Inquiry<'_, T>, &Selection<T>),
     free_run: (&Inquiry<'_, T>, &Selection<T>),
 ) -> bool {
     let (in_windows, selection) = windows;
     let (in_free_run, found) = free_run;
-    if found.selected.set() == selection.selected.set() {
-        return true;
-    }
-    let alone = in_free_run.refitted_afresh(&selection.selected);
-    let on_windows = in_windows.refitted_afresh(&found.selected);
-    let whole = (&found.selected, &on_windows);
-    let adds = || !led_astray(in_windows, selection) || adds(in_windows, in_free_run, &alone, whole);
-    alone.within(KEEPS_UP) && adds() || gain(in_windows, &selection.selected, &on_windows) > 0.0
+    let keeps_up = || in_free_run.refitted_afresh(&selection.selected).within(KEEPS_UP);
+    found.selected.set() == selection.selected.set()
+        || !led_astray(in_windows, selection) && keeps_up()
+        || gain(in_windows, &selection.selected, &in_windows.refitted_afresh(&found.selected)) > 0.0
 }
 
 /// Whether what was selected on windows does so much worse in free run than what was selected there, or so much as worse at greater

@@ -30,7 +30,7 @@ pub(super) fn searched<T: Twin>(
         return (selection, places, false);
     }
     let in_windows = Inquiry { evidence, ..*inquiry };
-    let upheld = free_run::upheld(&in_windows, (inquiry, &selection));
+    let upheld = free_run::upheld(&in_windows, &selection);
     if explains(&selection) && upheld {
         return (selection, places, false);
     }
