@@ -16,7 +16,7 @@ const AS_BEFORE: f64 = 1.02;
 /// What is selected, its rivals, and whether that was on the windows of `evidence` rather than in the free run of `inquiry`.
 ///
 /// Where a plant adds up errors, a free run tells most if the physics is complete, and hardly anything if it is not: windows are asked
-/// where it leaves more than noise, or what is slower.
+/// where it leaves more than noise, or what is slower, or where they do not uphold all that it found.
 pub(super) fn searched<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     evidence: &Evidence<'_, T::Stimulus>,
@@ -30,13 +30,15 @@ pub(super) fn searched<T: Twin>(
         return (selection, places, false);
     }
     let in_windows = Inquiry { evidence, ..*inquiry };
+    let explained = explains(&selection);
     let upheld = free_run::upheld(&in_windows, &selection);
-    if explains(&selection) && upheld {
+    if explained && upheld {
         return (selection, places, false);
     }
     let (on_windows, places_there) = settled(&in_windows, as_given, anew, progress);
+    // What explains a free run that was led astray brought it back by chance.
     let astray = !upheld && free_run::led_astray(&in_windows, &on_windows);
-    if explains(&selection) && !astray {
+    if explained && !astray {
         return (selection, places, false);
     }
     // What windows have found may be near enough for a free run to tell the rest.
