@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::pursue::HOPELESS;
 use super::selection::Selection;
 use super::weigh::{ACCEPT, lead, squares};
 use crate::sim2real::identify::Effort;
@@ -26,9 +27,13 @@ pub(super) fn goes_on<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T
     });
     let opened: Vec<Opened> = forms.filter_map(|form| Opened::of(inquiry, selected, place, form)).collect();
     opened.into_par_iter().any(|opened| {
-        let further = opened.followed(inquiry, selected, place);
-        opened.is_beyond(&further, inquiry, selected, place)
-            && lead(inquiry, &selection.recalibrated, &further, selected) > ACCEPT
+        let leads = |further: &Hypothesis<T>| lead(inquiry, &selection.recalibrated, further, selected);
+        let briefly = opened.followed(inquiry, selected, place);
+        if leads(&briefly) < -HOPELESS {
+            return false;
+        }
+        let further = inquiry.finished(briefly);
+        opened.is_beyond(&further, inquiry, selected, place) && leads(&further) > ACCEPT
     })
 }
 
@@ -66,7 +71,7 @@ impl Opened {
         open.then_some(Self { number, form, start })
     }
 
-    /// `selected` with this in the place of its `place`-th law.
+    /// `selected` with this in the place of its `place`-th law, followed a few steps.
     fn followed<T: Twin>(&self, inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, place: usize) -> Hypothesis<T> {
         let mut twin = inquiry.twin.clone();
         let mut added = selected.added.clone();
@@ -76,7 +81,7 @@ impl Opened {
         }
         let mut values = selected.fit.values.clone();
         values.splice(inquiry.of_mechanism(selected, place), self.start.iter().copied());
-        inquiry.begun(twin, added, &values, Some(&selected.fit.state), Effort::Thorough)
+        inquiry.begun(twin, added, &values, Some(&selected.fit.state), Effort::Brief)
     }
 
     /// Whether what was followed from the edge ended beyond it: another form may well do better within what goes by its name.

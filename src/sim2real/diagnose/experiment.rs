@@ -149,7 +149,7 @@ fn contenders<T: Twin>(
     }
     let fitted = kept.par_iter().filter_map(|(place, number)| {
         let less = &inquiry.stepped(selection.without.get(*place)?);
-        let screened = inquiry.screened(less).into_iter().find(|s| s.number == *number)?;
+        let screened = inquiry.screened_as(less, *number)?;
         Some((name(*number).to_owned(), inquiry.extended(less, &screened, STARTS, Effort::Thorough)))
     });
     fitted.collect()

@@ -238,6 +238,12 @@ impl<T: Twin> Inquiry<'_, T> {
         self.begun(self.with(added), added.clone(), &fit.values, Some(&fit.state), effort)
     }
 
+    /// `briefly`, of which a few steps were made, fitted to its end, whatever its twin has beside mechanisms.
+    pub fn finished(&self, briefly: Hypothesis<T>) -> Hypothesis<T> {
+        let Hypothesis { twin, added, fit, .. } = briefly;
+        self.begun(twin, added, &fit.values, Some(&fit.state), Effort::Thorough)
+    }
+
     /// `hypothesis` refitted where the recordings are divided in another way than they were for it.
     pub fn refitted_afresh(&self, hypothesis: &Hypothesis<T>) -> Hypothesis<T> {
         let Hypothesis { added, fit, .. } = hypothesis;
@@ -306,6 +312,14 @@ impl<T: Twin> Inquiry<'_, T> {
     /// How each candidate that `parent` does not have yet would do, by its signature.
     pub fn screened(&self, parent: &Hypothesis<T>) -> Vec<Screened> {
         signatures(self, parent, |_| true)
+    }
+
+    /// The same of candidate `number` alone.
+    pub fn screened_as(&self, parent: &Hypothesis<T>, number: usize) -> Option<Screened> {
+        // A wider law begins as the forms of its name do.
+        let name = self.candidates[number].about.name;
+        let alike = self.screened_among(parent, |candidate| candidate.about.name == name);
+        alike.into_iter().find(|screened| screened.number == number)
     }
 
     /// The same of the candidates that are `wanted` alone.

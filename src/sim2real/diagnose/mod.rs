@@ -55,6 +55,7 @@ mod remainder;
 mod rested;
 mod rivals;
 mod screen;
+mod screening;
 mod search;
 mod select;
 mod selection;

@@ -8,6 +8,8 @@ use super::needed::needed;
 use super::weigh::{ACCEPT, gain, lead, ranked, squares};
 use crate::sim2real::Twin;
 
+/// Two fits of one twin that leave as much but for this part came to the same.
+const AS_LITTLE: f64 = 1e-4;
 /// Of so many mechanisms, one may stand for what the others leave in the wrong form.
 const SEVERAL: usize = 3;
 
@@ -37,7 +39,7 @@ pub(super) fn pruned<T: Twin>(
             without = without.par_iter().map(|less| reformed(inquiry, recalibrated, less)).collect();
         }
         if let [alone] = without.as_mut_slice() {
-            if squares(alone) < squares(&bare) {
+            if squares(alone) < (1.0 - AS_LITTLE) * squares(&bare) {
                 bare = alone.clone();
             } else {
                 *alone = bare.clone();

@@ -8,7 +8,7 @@ use crate::sim2real::Twin;
 use crate::sim2real::identify::Effort;
 
 /// What stands behind by more than this after a few steps is not followed further, ...
-const HOPELESS: f64 = 300.0;
+pub(super) const HOPELESS: f64 = 300.0;
 /// ... unless a few steps more leave it behind by no more than this part of that.
 const CATCHES_UP: f64 = 0.7;
 

@@ -9,6 +9,7 @@ use super::hypothesis::{Hypothesis, Inquiry};
 use super::needed::{completes, share};
 use super::pursue::pursued;
 use super::screen::Screened;
+use super::screening::Screening;
 use super::selection::Selection;
 use super::weigh::{evidence, gain, lead, left_open};
 use crate::sim2real::{About, Candidate, Clock, Twin};
@@ -79,6 +80,8 @@ pub(super) fn settled<T: Twin>(inquiry: &Inquiry<'_, T>, selection: Selection<T>
         // What was second beside another may be worse than its rivals alone.
         (selection, places) = swapped(inquiry, selection.dropped(inquiry, place));
     }
+    // Signatures are as long as the recordings.
+    selection.screening = None;
     (selection, places)
 }
 
@@ -161,7 +164,7 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
         .map(|(place, (own, less))| {
             let name = inquiry.candidates[*own].about.name;
             let whole = gain(inquiry, less, selected);
-            let mut screened = inquiry.screened(less);
+            let mut screened = Screening::known_or_made(selection.screening.as_ref(), inquiry, less);
             screened.retain(|one| one.excited && inquiry.candidates[one.number].about.name != name);
             let losses = |tried: Vec<&Screened>| -> Vec<(usize, f64)> {
                 let one = |s: &&Screened| {

@@ -9,6 +9,7 @@ use super::needed::needed_share;
 use super::order::in_either_order;
 use super::prune::pruned;
 use super::screen::Screened;
+use super::screening::Screening;
 use super::selection::Selection;
 use super::weigh::{ACCEPT, gain, lead, ranked, squares};
 use super::whiteness::ChannelMisfit;
@@ -82,12 +83,14 @@ fn selected_from<T: Twin>(
 ) -> Selection<T> {
     let mut scores = Vec::new();
     let mut fitted: Vec<Hypothesis<T>> = Vec::new();
-    let mut beam = vec![start.clone().unwrap_or_else(|| recalibrated.clone())];
     let first_stage = start.as_ref().map_or(0, |start| start.added.len());
+    progress("comparing mechanisms", first_stage, STAGES);
+    let screening = start.is_none().then(|| Screening::beside(inquiry, &recalibrated));
+    let mut beam = vec![start.clone().unwrap_or_else(|| recalibrated.clone())];
     let mut best_of_stage: Vec<Hypothesis<T>> = start.into_iter().collect();
     for stage in first_stage..STAGES {
         progress("comparing mechanisms", stage, STAGES);
-        let (mut children, tried) = expand(inquiry, &recalibrated, &beam, stage);
+        let (mut children, tried) = expand(inquiry, &recalibrated, &beam, stage, screening.as_ref());
         scores.extend(tried);
         if !known.is_empty() {
             children.append(&mut known);
@@ -110,7 +113,7 @@ fn selected_from<T: Twin>(
         beam = built_on(inquiry, &recalibrated, &beam[0], children);
     }
     let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
-    Selection { recalibrated, selected, without, fitted, scores }
+    Selection { recalibrated, selected, without, fitted, scores, screening }
 }
 
 /// What is found beside `selection` as another inquiry follows the recordings. What was of no use beside it so far may do much there, and a
@@ -170,9 +173,10 @@ fn expand<T: Twin>(
     first: &Hypothesis<T>,
     beam: &[Hypothesis<T>],
     stage: usize,
+    screening: Option<&Screening>,
 ) -> (Vec<Hypothesis<T>>, Vec<Score>) {
     let beside = |(place, parent): (usize, &Hypothesis<T>)| -> Vec<Job> {
-        let mut screened = inquiry.screened(parent);
+        let mut screened = Screening::known_or_made(screening, inquiry, parent);
         screened.sort_by(|a, b| b.score.total_cmp(&a.score));
         let chosen = chosen(inquiry, first, parent, &screened, place);
         screened.into_iter().zip(chosen).map(|(screened, starts)| Job { place, screened, starts }).collect()

@@ -7,6 +7,7 @@ use super::free_run::strays;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::prune::{all_needed, pruned};
 use super::pursue::pursued;
+use super::screening::Screening;
 use super::weigh::{ABOVE_NOISE, lead};
 use crate::sim2real::{Candidate, Twin};
 
@@ -22,6 +23,8 @@ pub(super) struct Selection<T> {
     pub fitted: Vec<Hypothesis<T>>,
     /// Every mechanism tried in every stage.
     pub scores: Vec<Score>,
+    /// What screening found beside `recalibrated`, as long as rivals may be asked for.
+    pub screening: Option<Screening>,
 }
 
 impl<T: Twin> Selection<T> {
@@ -71,22 +74,22 @@ impl<T: Twin> Selection<T> {
     pub fn refitted(&self, inquiry: &Inquiry<'_, T>) -> Self {
         let whole = || (!self.selected.added.is_empty()).then(|| inquiry.refitted(&self.selected));
         let (recalibrated, whole) = rayon::join(|| inquiry.refitted(&self.recalibrated), whole);
-        let Some(whole) = whole else { return self.with_set((recalibrated.clone(), recalibrated, Vec::new())) };
+        let Some(whole) = whole else { return self.elsewhere((recalibrated.clone(), recalibrated, Vec::new())) };
         // What each is needed for with longer steps it is hardly ever not with these: only then is the set chosen anew.
         let without: Vec<Hypothesis<T>> = match self.without.as_slice() {
             [_] => vec![recalibrated.clone()],
             several => several.par_iter().map(|less| inquiry.refitted(less)).collect(),
         };
         if all_needed(inquiry, &recalibrated, &whole, &without) {
-            return self.with_set((recalibrated, whole, without));
+            return self.elsewhere((recalibrated, whole, without));
         }
-        self.with_set(pruned(inquiry, &recalibrated, vec![whole]))
+        self.elsewhere(pruned(inquiry, &recalibrated, vec![whole]))
     }
 
     /// This selection, nothing of it fitted anew, as another inquiry sees it.
     pub fn seen(&self, inquiry: &Inquiry<'_, T>) -> Self {
         let without = self.without.iter().map(|less| inquiry.seen(less)).collect();
-        self.with_set((inquiry.seen(&self.recalibrated), inquiry.seen(&self.selected), without))
+        self.elsewhere((inquiry.seen(&self.recalibrated), inquiry.seen(&self.selected), without))
     }
 
     /// The selection without its `place`-th mechanism.
@@ -103,7 +106,7 @@ impl<T: Twin> Selection<T> {
     /// The selection with the `place`-th mechanism replaced by candidate `other`, and what is no longer needed left out.
     pub fn swapped(&self, inquiry: &Inquiry<'_, T>, place: usize, other: usize) -> Option<Self> {
         let less = &self.without[place];
-        let screened = inquiry.screened(less).into_iter().find(|s| s.number == other)?;
+        let screened = inquiry.screened_as(less, other)?;
         // On the way on which it was found to be better.
         let whole = pursued(inquiry, &self.recalibrated, &self.selected, less, &screened);
         let swapped = self.with_set(pruned(inquiry, &self.recalibrated, vec![whole]));
@@ -124,7 +127,13 @@ impl<T: Twin> Selection<T> {
 
     /// This selection with another set selected: all that was tried remains known.
     fn with_set(&self, (recalibrated, selected, without): (Hypothesis<T>, Hypothesis<T>, Vec<Hypothesis<T>>)) -> Self {
-        Self { recalibrated, selected, without, fitted: self.fitted.clone(), scores: self.scores.clone() }
+        let (fitted, scores, screening) = (self.fitted.clone(), self.scores.clone(), self.screening.clone());
+        Self { recalibrated, selected, without, fitted, scores, screening }
+    }
+
+    /// The same of another inquiry, whose twin changes in another way.
+    fn elsewhere(&self, set: (Hypothesis<T>, Hypothesis<T>, Vec<Hypothesis<T>>)) -> Self {
+        Self { screening: None, ..self.with_set(set) }
     }
 }
 
@@ -146,9 +155,8 @@ mod tests {
 
     const SENSOR: Registry<Wire> = &[&Bias, &Drift { rate: None }];
 
-    /// What is selected of a bias and a drift, both of them fitted with other steps, once these are fitted to what a sensor that wanders by
-    /// `rate` made of nothing.
-    fn refitted(rate: f64) -> Vec<&'static str> {
+    /// Asks `asked` what becomes of a bias and a drift that were both selected, of what a sensor that wanders by `rate` made of nothing.
+    fn of_a_sensor<R>(rate: f64, asked: impl Fn(&Inquiry<'_, Assembly<Wire>>, Selection<Assembly<Wire>>) -> R) -> R {
         let mut rng = Seed(7).stream("noise");
         let time: Vec<f64> = (0..2_000).map(|i| 0.01 * f64::from(i)).collect();
         let read = |t: &f64| -> f64 {
@@ -169,19 +177,23 @@ mod tests {
             let given: Vec<f64> = twin.parameters().iter().map(|p| p.nominal).collect();
             inquiry.begun(twin, added, &given, None, Effort::Thorough)
         };
-        let selection = Selection {
-            recalibrated: of(&[]),
-            selected: of(&["bias", "drift"]),
-            without: vec![of(&["drift"]), of(&["bias"])],
-            fitted: Vec::new(),
-            scores: vec![accepted()],
-        };
-        let refitted = selection.refitted(&inquiry);
-        assert_eq!(refitted.without.len(), refitted.selected.added.len());
-        let chosen = refitted.selected.added.clone();
-        let bare = refitted.bare();
-        assert!(bare.selected.added.is_empty() && bare.without.is_empty() && !bare.scores[0].accepted);
-        chosen.iter().map(|number| candidates[*number].about.name).collect()
+        let recalibrated = of(&[]);
+        let screening = Some(Screening::beside(&inquiry, &recalibrated));
+        let without = vec![of(&["drift"]), of(&["bias"])];
+        let (selected, fitted, scores) = (of(&["bias", "drift"]), Vec::new(), vec![accepted()]);
+        asked(&inquiry, Selection { recalibrated, selected, without, fitted, scores, screening })
+    }
+
+    /// What is selected once that is fitted with other steps.
+    fn refitted(rate: f64) -> Vec<&'static str> {
+        of_a_sensor(rate, |inquiry, selection| {
+            let refitted = selection.refitted(inquiry);
+            assert_eq!(refitted.without.len(), refitted.selected.added.len());
+            let chosen = refitted.selected.added.clone();
+            let bare = refitted.bare();
+            assert!(bare.selected.added.is_empty() && bare.without.is_empty() && !bare.scores[0].accepted);
+            chosen.iter().map(|number| inquiry.candidates[*number].about.name).collect()
+        })
     }
 
     fn accepted() -> Score {
@@ -201,6 +213,23 @@ mod tests {
     fn what_other_steps_do_not_need_is_left_out() {
         assert_eq!(refitted(0.01), ["bias", "drift"]);
         assert_eq!(refitted(0.0), ["bias"], "a sensor that does not wander");
+    }
+
+    #[test]
+    fn screening_is_not_done_twice_of_the_same_and_anew_of_all_else() {
+        of_a_sensor(0.01, |inquiry, selection| {
+            let known = selection.screening.as_ref();
+            let anew = inquiry.screened(&selection.recalibrated);
+            assert_eq!(Screening::known_or_made(known, inquiry, &selection.recalibrated), anew);
+            let beside_drift = &selection.without[0];
+            let of_another = Some(Screening::beside(inquiry, beside_drift));
+            assert_ne!(inquiry.screened(beside_drift), anew, "a drift is not screened beside itself");
+            assert_eq!(Screening::known_or_made(of_another.as_ref(), inquiry, &selection.recalibrated), anew);
+            assert!(selection.refitted(inquiry).screening.is_none(), "other steps change other things");
+            for one in &anew {
+                assert_eq!(inquiry.screened_as(&selection.recalibrated, one.number).as_ref(), Some(one));
+            }
+        });
     }
 
     #[test]

@@ -269,8 +269,10 @@ impl<'a, 'b, S: Simulator> Descent<'a, 'b, S> {
         if self.objective <= STANDS * self.normal.measured as f64 || self.state.values.iter().all(Vec::is_empty) {
             return self;
         }
-        let mut other = Self::new(self.problem, &self.theta, self.free, &self.state);
-        (other.holds_back, other.damping) = (true, 1.0);
+        self.settle();
+        let (theta, state, runs, normal) = (self.theta.clone(), self.state.clone(), self.runs.clone(), self.normal.clone());
+        let (holds_back, damping, fell, ended) = (true, 1.0, 0.0, false);
+        let mut other = Self { theta, state, runs, normal, holds_back, damping, fell, ended, left: None, ..self };
         other.run(PROBE + 1);
         other.run_while_falling(steps, SLOWLY);
         let noise = self.normal.measured as f64;

@@ -9,7 +9,7 @@ use super::problem::{Followed, Runs};
 use crate::sim2real::Parameter;
 
 /// What a step of a fit needs to know of residuals and derivatives, once initial states are moved to where they fit best.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Normal {
     /// `J'J`.
     pub information: DMatrix<f64>,

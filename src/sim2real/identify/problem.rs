@@ -68,7 +68,7 @@ pub struct Evaluation {
 }
 
 /// One part followed: residuals and their derivatives, before what initial states explain is taken out.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Followed {
     pub residual: DVector<f64>,
     pub derivatives: Vec<DVector<f64>>,
@@ -76,7 +76,7 @@ pub(super) struct Followed {
 }
 
 /// All parts followed.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Runs(pub Vec<Followed>);
 
 /// One part evaluated: residuals, and one column a perturbed parameter.
