@@ -31,6 +31,10 @@ const USUAL: f64 = 6.0;
 /// to be 70 to 90 % sure by what is above, and all but one in a hundred of those that are surer.
 const SURE: f64 = 0.2;
 const SURER: f64 = 2.0;
+/// What a rival loses counts so many times, up to the loss after it: of 97 names of six spent test seeds whose nearest rival lost by .5 to
+/// 3, 76 were right, where the evidence alone made that 57 in 100; twice the logarithm of such odds is 2.6.
+const TELLS: f64 = 3.0;
+const TOLD: f64 = 2.4;
 /// Nothing that is fitted is surer than this.
 const SUREST: f64 = 0.99;
 
@@ -60,8 +64,8 @@ pub(super) fn calibrated(place: &Place, doubts: &Doubts) -> (f64, Vec<f64>) {
         + BY_IMPLAUSIBILITY * (doubts.implausibility - USUAL).max(0.0);
     let odds = odds + (SURER - 1.0) * (odds - SURE).max(0.0);
     let one_of_them = 1.0 / (1.0 + (-odds).exp());
-    // A name and its rivals share what is sure of them by their evidence: of two that explain the same neither is surer.
-    let (own, others) = by_evidence(place);
+    // A name and its rivals share what is sure of them: of two that explain the same neither is surer.
+    let (own, others) = shares(place, |loss| loss.max((TELLS * loss).min(TOLD)));
     let scale = one_of_them / (own + others.iter().sum::<f64>()).max(1e-12);
     ((scale * own).min(SUREST), others.into_iter().map(|other| scale * other).collect())
 }
@@ -69,7 +73,12 @@ pub(super) fn calibrated(place: &Place, doubts: &Doubts) -> (f64, Vec<f64>) {
 /// The same from what rivals lose alone: the gain is twice the logarithm of a likelihood ratio. That nothing is missing in
 /// its place takes part too.
 pub(super) fn by_evidence(place: &Place) -> (f64, Vec<f64>) {
-    let others: Vec<f64> = place.others.iter().map(|(_, loss)| weight(*loss)).collect();
+    shares(place, |loss| loss)
+}
+
+/// The share of the selected mechanism and of each rival, where what a rival loses counts for as much as it is `told` by.
+fn shares(place: &Place, told: impl Fn(f64) -> f64) -> (f64, Vec<f64>) {
+    let others: Vec<f64> = place.others.iter().map(|(_, loss)| weight(told(*loss))).collect();
     let total = 1.0 + weight(place.gain) + others.iter().sum::<f64>();
     (1.0 / total, others.into_iter().map(|w| w / total).collect())
 }
@@ -88,6 +97,20 @@ mod tests {
         assert!((own - 0.5).abs() < 1e-9 && (others[0] - 0.5).abs() < 1e-9);
         let (own, _) = by_evidence(&Place { gain: 100.0, nearest: None, others: vec![(1, 9.0)] });
         assert!(own > 0.98);
+    }
+
+    #[test]
+    fn what_little_evidence_tells_apart_is_told_apart_more_often_than_not() {
+        let share = |loss: f64| {
+            let place = Place { gain: 5_000.0, nearest: Some(loss), others: vec![(1, loss)] };
+            let (own, others) = calibrated(&place, &Doubts::default());
+            own / (own + others[0])
+        };
+        assert_eq!(share(0.0), 0.5, "nothing tells");
+        assert!((0.75..0.80).contains(&share(0.8)) && share(0.4) < share(0.8), "{}", share(0.8));
+        assert!(share(2.4) == share(0.8) && share(3.0) > share(2.4), "as the evidence says, once that is more");
+        let (own, others) = by_evidence(&Place { gain: 5_000.0, nearest: Some(0.8), others: vec![(1, 0.8)] });
+        assert!(own / (own + others[0]) < 0.6, "what is selected is chosen as before");
     }
 
     #[test]
