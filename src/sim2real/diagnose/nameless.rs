@@ -64,8 +64,8 @@ fn told_by<T>(selected: &Hypothesis<T>, instead: &Hypothesis<T>) -> f64 {
     channels.map(|(own, other)| other.effective() * (own.sum_of_squares / other.sum_of_squares).ln()).sum()
 }
 
-/// `less` with a curve, which is fitted from nothing on; to its end where a few steps have come as far as what was `selected` has: of eighty
-/// that were behind then (two spent test seeds) none came to be ahead, and their ends took six times as long.
+/// `less` with a curve, which is fitted from nothing on; to its end where a few steps have come as far as what was `selected` has: of 69
+/// that were behind then (two spent test seeds) none came to be ahead, and their ends took four times as long.
 fn instead(
     inquiry: &Inquiry<'_, AnyTwin>,
     selected: &Hypothesis<AnyTwin>,
