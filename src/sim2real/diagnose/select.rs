@@ -84,8 +84,10 @@ fn selected_from<T: Twin>(
     let mut scores = Vec::new();
     let mut fitted: Vec<Hypothesis<T>> = Vec::new();
     let first_stage = start.as_ref().map_or(0, |start| start.added.len());
-    progress("comparing mechanisms", first_stage, STAGES);
-    let screening = start.is_none().then(|| Screening::beside(inquiry, &recalibrated));
+    let screening = start.is_none().then(|| {
+        progress("screening mechanisms", 0, 1);
+        Screening::beside(inquiry, &recalibrated)
+    });
     let mut beam = vec![start.clone().unwrap_or_else(|| recalibrated.clone())];
     let mut best_of_stage: Vec<Hypothesis<T>> = start.into_iter().collect();
     for stage in first_stage..STAGES {
