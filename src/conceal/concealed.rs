@@ -14,6 +14,10 @@ pub struct Concealed {
     pub size: f64,
     /// Its true parameters, as far as a registry's of that name can be compared with them.
     pub parameters: BTreeMap<String, f64>,
+    /// What they are to be called in forms that lack some of them and do what these do as nearly as they can: a set of names and values
+    /// for each such form, all of its names among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub simpler: Vec<BTreeMap<String, f64>>,
     /// When it began [s], where not from the start: of what takes a while, the middle of that.
     pub onset: Option<f64>,
     /// When it acted, in the recording to learn from, where it acts at times only.

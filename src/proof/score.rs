@@ -167,6 +167,7 @@ pub(super) mod tests {
             id: (*id).to_owned(),
             size: *size,
             parameters: BTreeMap::new(),
+            simpler: Vec::new(),
             onset: None,
             active: Vec::new(),
         });

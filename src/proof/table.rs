@@ -1,5 +1,7 @@
 //! The table of figures.
 
+use std::collections::BTreeMap;
+
 use super::domain::Domain;
 use super::figure::{Figure, Goal, Unit};
 use super::goals::{CONFIDENT_WRONG, Goals, TOLD_APART};
@@ -252,10 +254,10 @@ fn parameters(entries: &[&Entry], goals: &Goals) -> [Figure; 2] {
             if let Some(found) =
                 entry.trial.found.iter().find(|f| f.mechanism == effect.id && answer.names.contains(&f.mechanism))
             {
-                own.extend(pairs(effect, |name| found.parameters.get(name).copied()));
+                own.extend(pairs(effect, &found.parameters));
             }
             if let Some(oracle) = &entry.trial.oracle {
-                told.extend(pairs(effect, |name| oracle.parameters.get(place)?.get(name).copied()));
+                told.extend(oracle.parameters.get(place).into_iter().flat_map(|fitted| pairs(effect, fitted)));
             }
         }
     }
@@ -274,14 +276,16 @@ fn parameters(entries: &[&Entry], goals: &Goals) -> [Figure; 2] {
 }
 
 /// The parameters of an effect that can be compared: those that the form found has in common with the truth.
-fn pairs(effect: &Concealed, fitted: impl Fn(&str) -> Option<Fitted>) -> Vec<Pair> {
-    let truth = |name: &str| effect.parameters.get(name).copied().unwrap_or(0.0);
+fn pairs(effect: &Concealed, fitted: &BTreeMap<String, Fitted>) -> Vec<Pair> {
+    let of_its_form = effect.simpler.iter().find(|simpler| simpler.keys().eq(fitted.keys()));
+    let truths = of_its_form.unwrap_or(&effect.parameters);
+    let truth = |name: &str| truths.get(name).copied().unwrap_or(0.0);
     // One of the two parts of a wave may be next to nothing: both are measured by the whole.
     let amplitude = truth("sine").hypot(truth("cosine"));
-    let comparable = effect.parameters.iter().filter(|(name, truth)| name.as_str() != "time" && **truth != 0.0);
+    let comparable = truths.iter().filter(|(name, truth)| name.as_str() != "time" && **truth != 0.0);
     let pair = |(name, truth): (&String, &f64)| {
         let scale = if ["sine", "cosine"].contains(&name.as_str()) { amplitude } else { truth.abs() };
-        Some(Pair { fitted: fitted(name)?, truth: *truth, scale })
+        Some(Pair { fitted: *fitted.get(name)?, truth: *truth, scale })
     };
     comparable.filter_map(pair).collect()
 }
@@ -334,6 +338,27 @@ mod tests {
         let pair = |value, std| Pair { fitted: Fitted { value, std: Some(std) }, truth, scale: 1.0 };
         assert!(pair(0.3, 0.0).covered() && !pair(0.3 + 1e-9, 0.0).covered());
         assert!(pair(0.31, 0.006).covered() && !pair(0.31, 0.005).covered());
+    }
+
+    #[test]
+    fn a_form_is_held_to_what_it_can_do() {
+        let named = |pairs: &[(&str, f64)]| pairs.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        let effect = Concealed {
+            id: "eccentricity".into(),
+            size: 5.0,
+            parameters: named(&[("sine", 0.3), ("cosine", 0.4), ("second_sine", 0.1)]),
+            simpler: vec![named(&[("sine", 0.5), ("cosine", 1.2)])],
+            onset: None,
+            active: Vec::new(),
+        };
+        let fitted =
+            |names: &[&str]| names.iter().map(|name| ((*name).to_owned(), Fitted { value: 0.0, std: Some(1.0) })).collect();
+        let truths = |names: &[&str]| -> Vec<[f64; 2]> {
+            pairs(&effect, &fitted(names)).iter().map(|pair| [pair.truth, pair.scale]).collect()
+        };
+        assert_eq!(truths(&["sine", "cosine"]), [[1.2, 1.3], [0.5, 1.3]]);
+        let whole = [[0.4, 0.5], [0.1, 0.1], [0.3, 0.5]];
+        assert_eq!(truths(&["sine", "cosine", "second_sine", "second_cosine"]), whole);
     }
 
     #[test]

@@ -30,6 +30,9 @@ pub struct Parameter {
     /// Whether its effect grows in proportion to it, from the nominal value on, where it is small: a screen then solves
     /// for it instead of trying values.
     pub linear: bool,
+    /// Whether it says when something happens or by how long it is late. Such a number is what it is; all others stand for what a
+    /// law of another form does, and are off as that form differs.
+    pub shift: bool,
     /// Where the bounds come from.
     pub source: Cow<'static, str>,
 }
@@ -56,6 +59,7 @@ impl Parameter {
             rests_or: None,
             smooth: true,
             linear: false,
+            shift: false,
             source: Cow::Borrowed(""),
         }
     }
@@ -101,6 +105,13 @@ impl Parameter {
     #[must_use]
     pub fn proportional(mut self) -> Self {
         self.linear = true;
+        self
+    }
+
+    /// Says that it is a moment, or how late something is.
+    #[must_use]
+    pub fn in_time(mut self) -> Self {
+        self.shift = true;
         self
     }
 

@@ -311,6 +311,7 @@ impl Set {
                 id: recipe.id.to_owned(),
                 size: *size,
                 parameters: truth::parameters(recipe.id, &effect, &self.scales, &met),
+                simpler: truth::simpler(&effect, &self.scales, &met),
                 onset: truth::onset(&effect).filter(|_| !absent),
                 active: if absent { Vec::new() } else { truth::active(&effect, &machine, &sensor, &self.drives[0], motion) },
             }

@@ -45,7 +45,7 @@ pub(super) fn parameters(id: &str, effect: &Effect, scales: &Scales, met: &Met) 
             // Beside it, viscous friction is fitted.
             let drag = |v: f64| coefficient * v.abs().powf(1.9).copysign(v);
             let square = closest(&met.velocities, drag, &[&|v| v * v.abs(), &|v| v]);
-            vec![("coefficient", square), ("unit_torque", coefficient), ("power", 1.9)]
+            vec![("coefficient", square[0]), ("unit_torque", coefficient), ("power", 1.9)]
         }
         (_, Effect::Pull { torque, .. }) => vec![("torque", torque)],
         (_, Effect::Spring { rate, reach }) => {
@@ -55,7 +55,8 @@ pub(super) fn parameters(id: &str, effect: &Effect, scales: &Scales, met: &Met) 
         }
         (_, Effect::StiffeningSpring { rate, reach }) => {
             let torque = |q: f64| rate * q.powi(3) * (1.0 + 0.2 * (q / reach).powi(2));
-            vec![("rate", sprung(torque, |q| q.powi(3), scales, met))]
+            let cube = sprung(torque, |q| q.powi(3), scales, met);
+            vec![("rate", cube), ("bent_rate", rate), ("fifth_rate", 0.2 * rate / (reach * reach))]
         }
         (_, Effect::Magnets { torque, count, phase, .. }) => {
             let number = if scales.arm.linear { "wave_number" } else { "counts" };
@@ -96,6 +97,23 @@ pub(super) fn parameters(id: &str, effect: &Effect, scales: &Scales, met: &Met) 
         (_, Effect::Wobble { .. }) if scales.arm.adds_up() => Vec::new(),
         _ => of_sensor(effect),
     };
+    finite(named)
+}
+
+/// The same in forms that have fewer of these names.
+pub(super) fn simpler(effect: &Effect, scales: &Scales, met: &Met) -> Vec<BTreeMap<String, f64>> {
+    match *effect {
+        Effect::Wobble { size, phase, harmonic } if !scales.arm.adds_up() => {
+            // One wave a turn takes on what it can of the second.
+            let error = |q: f64| size * ((q + phase).sin() + harmonic * (2.0 * q).sin());
+            let wave = closest(&met.positions, error, &[&f64::sin, &f64::cos]);
+            vec![finite(["sine", "cosine"].into_iter().zip(wave).collect())]
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn finite(named: Vec<(&str, f64)>) -> BTreeMap<String, f64> {
     named.into_iter().filter(|(_, value)| value.is_finite()).map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
@@ -106,27 +124,29 @@ fn of_sensor(effect: &Effect) -> Vec<(&'static str, f64)> {
         Effect::Creep { size, settling: Some(settling) } => vec![("offset", size), ("time_constant", settling)],
         Effect::Counts { step } => vec![("step", step)],
         Effect::Fold { share, .. } => vec![("fraction", share)],
-        Effect::Wobble { size, phase, .. } => vec![("sine", size * phase.cos()), ("cosine", size * phase.sin())],
+        Effect::Wobble { size, phase, harmonic } => {
+            vec![("sine", size * phase.cos()), ("cosine", size * phase.sin()), ("second_sine", size * harmonic)]
+        }
         Effect::Stretch { excess, .. } => vec![("error", excess)],
         _ => Vec::new(),
     }
 }
 
-/// The first factor with which `forms` together come closest to `given` over the points met.
-fn closest(points: &[f64], given: impl Fn(f64) -> f64, forms: &[&dyn Fn(f64) -> f64]) -> f64 {
+/// The factors with which `forms` together come closest to `given` over the points met; not a number where there are none.
+fn closest(points: &[f64], given: impl Fn(f64) -> f64, forms: &[&dyn Fn(f64) -> f64]) -> Vec<f64> {
     let design = DMatrix::from_fn(points.len(), forms.len(), |row, k| forms[k](points[row]));
     let target = DVector::from_iterator(points.len(), points.iter().map(|point| given(*point)));
     let inverse = design.tr_mul(&design).try_inverse();
-    inverse.map_or(f64::NAN, |inverse| (inverse * design.tr_mul(&target))[0])
+    inverse.map_or(vec![f64::NAN; forms.len()], |inverse| (inverse * design.tr_mul(&target)).as_slice().to_vec())
 }
 
 /// The rate of a spring of one power that comes closest; gravity is fitted beside it, where there is any.
 fn sprung(given: impl Fn(f64) -> f64, power: impl Fn(f64) -> f64, scales: &Scales, met: &Met) -> f64 {
     let weight = |q: f64| q.sin();
     let forms: [&dyn Fn(f64) -> f64; 2] = [&power, &weight];
-    // A twin knows its gravity too well for small swings to tell it from a spring.
-    let weighed = scales.arm.gravity_torque > 0.0 && scales.reach > 0.8;
-    closest(&met.positions, given, &forms[..if weighed { 2 } else { 1 }])
+    // However little it swings: a spring that is told from gravity at all leaves it free to take on most of what bends.
+    let weighed = scales.arm.gravity_torque > 0.0;
+    closest(&met.positions, given, &forms[..if weighed { 2 } else { 1 }])[0]
 }
 
 /// The number with which `form` comes closest to `given` over the commands met, looked for about a first guess.
@@ -170,5 +190,27 @@ pub(super) fn active(effect: &Effect, machine: &Machine, sensor: &Sensor, drive:
         }
         Effect::Bursts { .. } => sensor.bursts(),
         _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn swinging(amplitude: f64) -> Vec<f64> {
+        (0..500).map(|k| amplitude * (0.1 * f64::from(k)).sin()).collect()
+    }
+
+    /// `q^3` is about `6 (q - sin q)`, and `sin 2 q` about `2 sin q`.
+    #[test]
+    fn a_form_takes_on_what_it_can_of_what_it_lacks() {
+        let points = swinging(0.1);
+        let factors = closest(&points, |q| q.powi(3), &[&|q| q, &f64::sin]);
+        assert!((factors[0] - 6.0).abs() < 0.02 && (factors[1] + 6.0).abs() < 0.02, "{factors:?}");
+        let alone = closest(&points, |q| q.powi(3), &[&|q| q]);
+        assert!((alone[0] - 0.0075).abs() < 1e-4, "{alone:?}");
+        let wave = closest(&points, |q| (2.0 * q).sin(), &[&f64::sin, &f64::cos]);
+        assert!((wave[0] - 2.0).abs() < 0.02 && wave[1].abs() < 1e-3, "{wave:?}");
+        assert!(closest(&[0.0; 9], f64::sin, &[&f64::sin])[0].is_nan());
     }
 }

@@ -234,6 +234,7 @@ impl Set {
                 id: self.recipes[k].id.to_owned(),
                 size: sizes[k],
                 parameters: parameters(self.recipes[k].id, &self.effects[k], &scene, [&with, &without], self.told),
+                simpler: Vec::new(),
                 onset: None,
                 active: Vec::new(),
             }

@@ -37,7 +37,7 @@ impl<P: Mover> Mechanism<P> for PayloadChange {
         let spacing = (typical.duration / TIMES).max(1.0);
         let count = ((typical.duration / spacing).ceil() as usize).clamp(2, TIMES as usize);
         let times: Vec<f64> = (1..count).map(|k| k as f64 * spacing).collect();
-        let time = || Parameter::new("time", "s", 0.0).within(0.0, f64::INFINITY).starting_at(&times);
+        let time = || Parameter::new("time", "s", 0.0).within(0.0, f64::INFINITY).starting_at(&times).in_time();
         let fraction =
             |name, least| Parameter::new(name, "", 0.0).within(least, f64::INFINITY).starting_at(&[0.2]).proportional();
         vec![

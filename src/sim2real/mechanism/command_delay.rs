@@ -60,7 +60,7 @@ impl<P: Plant> Mechanism<P> for CommandDelay {
     fn forms(&self, typical: &Typical) -> Vec<Form> {
         let starts = self.where_fits_begin(typical);
         let delay = |name| {
-            let mut delay = Parameter::new(name, "s", 0.0).within(0.0, self.longest).starting_at(&starts);
+            let mut delay = Parameter::new(name, "s", 0.0).within(0.0, self.longest).starting_at(&starts).in_time();
             delay.smooth = self.holds;
             delay.shown = typical.delays.filter(|[delay, _]| *delay > 0.0 && *delay <= self.longest);
             delay

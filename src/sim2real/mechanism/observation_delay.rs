@@ -40,7 +40,7 @@ where
     }
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
-        Form::only(vec![Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(self.starts)])
+        Form::only(vec![Parameter::new("seconds", "s", 0.0).within(0.0, self.longest).starting_at(self.starts).in_time()])
     }
 
     fn law(&self, _form: usize, thetas: &Thetas, _seed: Seed) -> Box<dyn Law<P>> {

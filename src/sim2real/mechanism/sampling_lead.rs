@@ -35,7 +35,7 @@ where
     }
 
     fn forms(&self, _typical: &Typical) -> Vec<Form> {
-        Form::only(vec![Parameter::new("lead", "s", 0.0).within(0.0, LONGEST).starting_at(&[5e-4])])
+        Form::only(vec![Parameter::new("lead", "s", 0.0).within(0.0, LONGEST).starting_at(&[5e-4]).in_time()])
     }
 
     fn of_the_record(&self) -> bool {
