@@ -128,7 +128,12 @@ fn a_late_sensor_is_told_from_a_late_command_by_what_began_at_rest() {
 fn beneath_the_steps_of_a_sensor_what_moves_less_than_one_of_them_is_named() {
     let trial = tried(61, 101);
     assert_eq!(names(&trial), ["end_stop", "quantization"], "{:?}", trial.found);
-    // Counters change back later than they changed, which looks like a late sensor and is none.
+}
+
+/// Counters change back later than they changed, which looks like a late sensor and is none.
+#[test]
+#[ignore = "takes a quarter of a minute: `./x test --test robot -- --ignored`"]
+fn a_counter_that_changes_late_is_no_late_sensor() {
     assert_eq!(names(&tried(62, 160)), ["quantization"]);
 }
 
@@ -223,6 +228,7 @@ fn what_a_law_is_off_by_has_no_name() {
 /// A sensor of coarse steps changes back later than it changed: as long as that goes for a time that is missing, it hides what moves less
 /// than a step. Time that is missing besides is found, and what noise makes look like it is not.
 #[test]
+#[ignore = "takes a third of a minute: `./x test --test robot -- --ignored`"]
 fn a_counter_that_changes_late_hides_nothing() {
     assert_eq!(names(&tried(64, 188)), ["observation_delay", "quantization"]);
 }

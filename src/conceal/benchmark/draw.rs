@@ -396,7 +396,7 @@ mod tests {
         for (id, target) in [("stiffness", 3.0), ("coulomb_friction", 5.0), ("compliance", 2.0), ("command_delay", 8.0)] {
             let plan = Plan { kind: Kind::Single, ids: vec![id] };
             let mut hits = 0;
-            for attempt in 0..6 {
+            for attempt in 0..3 {
                 let set = Set::draw(&plan, Seed(attempt));
                 let Ok(Dosage { dosed, sizes }) = set.concealing(&plan, &[target]) else { continue };
                 let (noise, hideable) = (set.noise_of(0), set.hideable());
