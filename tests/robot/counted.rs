@@ -13,11 +13,16 @@ const STEP: f64 = std::f64::consts::TAU / 4096.0;
 
 /// An arm by short steps of the midpoint rule, its angle counted and written down to six decimals. There is no noise beside the steps.
 fn recorded(name: &str, salt: u64) -> Recording<Commands> {
+    pulled(name, salt, 0.0)
+}
+
+/// The same with a load that pulls one way [N m].
+fn pulled(name: &str, salt: u64, load: f64) -> Recording<Commands> {
     let (mut q, mut v) = (0.0_f64, 0.0_f64);
     crate::arm_scene::recorded(name, salt, [("position", "rad")], |command, _| {
         let read = ((q / STEP).round() * STEP * 1e6).round() / 1e6;
         let [inertia, viscous, gravity] = ARM;
-        let faster = |q: f64, v: f64| (command - viscous * v - gravity * q.sin()) / inertia;
+        let faster = |q: f64, v: f64| (command - load - viscous * v - gravity * q.sin()) / inertia;
         for _ in 0..40 {
             let h = SPACING / 40.0;
             let (middle, speed) = (q + 0.5 * h * v, v + 0.5 * h * faster(q, v));
@@ -50,4 +55,14 @@ fn counts_are_steps_and_their_twin_is_right_and_can_be_fitted_again() {
     }
     let fit = &again.fit[0];
     assert!(fit.recalibrated_rmse < 0.7 * fit.noise_floor, "{fit:?}");
+}
+
+/// Counts are seen whatever else there is; that the twin explains the rest is said only where it does.
+#[test]
+fn what_counts_do_not_explain_is_said() {
+    let outcome = diagnose(&twin(), &[recorded("train", 1)], &[pulled("test", 2, 0.3)], Seed(0), &|_, _, _| {});
+    let found = &outcome.diagnosis;
+    let names: Vec<&str> = found.effects.iter().map(|effect| effect.mechanism.as_str()).collect();
+    assert_eq!((found.verdict, names), (Verdict::Named, vec!["quantization"]), "{}", found.summary);
+    assert!(found.summary.contains("explains what was fitted and not what was held out"), "{}", found.summary);
 }

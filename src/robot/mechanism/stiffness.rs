@@ -4,7 +4,8 @@ use crate::robot::Mover;
 use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Scene, Seed, Site, Thetas, Tick, Typical};
 
 /// `-rate q`; in the form `bent`, `-bent_rate q - third_rate q^3`: no spring is quite straight, and one that bends is one
-/// spring, not two.
+/// spring, not two. Beside gravity that is fitted, the straight form takes on what bends, too: `q^3` is about `6 (q - sin q)`, so that
+/// its rate is about `bent_rate + 6 third_rate`, however small the swing.
 ///
 /// Source: Hooke, *De potentia restitutiva* (1678).
 #[derive(Debug, Clone, Copy)]

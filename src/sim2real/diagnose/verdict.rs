@@ -92,12 +92,19 @@ pub(super) fn recognized<T: Twin>(
         (signs.step > 0.0).then(|| format!("the sensor counts in steps of {} {unit}", words::figure(signs.step, 3))),
     ];
     let told = of_signs.into_iter().flatten().collect::<Vec<_>>().join("; ");
-    // What was not moved enough to be told of does not unsay what is seen.
-    let nothing_else = diagnosis.verdict == Verdict::NotExcited && diagnosis.effects.is_empty();
-    if diagnosis.verdict == Verdict::NoMismatch || nothing_else {
+    let summary = match diagnosis.verdict {
+        Verdict::NoMismatch => {
+            Some(format!("The recordings show that {told}; for the rest the {} explains them.", inquiry.twin.name()))
+        }
+        // What was not moved enough to be told of does not unsay what is seen, nor is it explained by that.
+        Verdict::NotExcited if diagnosis.effects.is_empty() => {
+            Some(format!("The recordings show that {told}. {}", diagnosis.summary))
+        }
+        _ => None,
+    };
+    if let Some(summary) = summary {
         diagnosis.verdict = Verdict::Named;
-        diagnosis.summary =
-            format!("The recordings show that {told}; for the rest the {} explains them.", inquiry.twin.name());
+        diagnosis.summary = summary;
     }
     diagnosis.checks.notes.push(told);
     diagnosis.effects.extend(found.iter().map(|candidate| effects::seen(inquiry, of_what, candidate)));

@@ -5,7 +5,8 @@ use crate::sim2real::{About, Form, LaneChange, Law, Mechanism, Parameter, Plant,
 
 /// `y -> y + sine sin(y) + cosine cos(y)`, on the plant's first channel, an angle: a disc off its axis is wrong once a turn. In the
 /// form `two_harmonics`, also `second_sine sin(2 y) + second_cosine cos(2 y)`: a disc that is oval or tilted, or a ring magnet
-/// whose two tracks differ in size, is wrong twice.
+/// whose two tracks differ in size, is wrong twice. Over a small swing one harmonic takes on what a second one does there: `sin(2 y)` is
+/// about `2 sin(y)`, so that its sine is about `sine + 2 second_sine`.
 ///
 /// In forms `.._with_rate` the first channel's rate of change is told from the same readings, as a drive tells a speed from its
 /// encoder, and is wrong with them. In the others it has a sensor of its own.
