@@ -13,14 +13,15 @@ const STEP: f64 = std::f64::consts::TAU / 4096.0;
 
 /// An arm by short steps of the midpoint rule, its angle counted and written down to six decimals. There is no noise beside the steps.
 fn recorded(name: &str, salt: u64) -> Recording<Commands> {
-    pulled(name, salt, 0.0)
+    pulled(name, salt, 0.0, 0.0)
 }
 
-/// The same with a load that pulls one way [N m].
-fn pulled(name: &str, salt: u64, load: f64) -> Recording<Commands> {
+/// The same with a load that pulls one way [N m], and what is counted off by up to so many steps.
+fn pulled(name: &str, salt: u64, load: f64, noise: f64) -> Recording<Commands> {
     let (mut q, mut v) = (0.0_f64, 0.0_f64);
-    crate::arm_scene::recorded(name, salt, [("position", "rad")], |command, _| {
-        let read = ((q / STEP).round() * STEP * 1e6).round() / 1e6;
+    crate::arm_scene::recorded(name, salt, [("position", "rad")], |command, chance| {
+        let off = if noise > 0.0 { noise * chance.draw() } else { 0.0 };
+        let read = ((q / STEP + off).round() * STEP * 1e6).round() / 1e6;
         let [inertia, viscous, gravity] = ARM;
         let faster = |q: f64, v: f64| (command - load - viscous * v - gravity * q.sin()) / inertia;
         for _ in 0..40 {
@@ -60,7 +61,8 @@ fn counts_are_steps_and_their_twin_is_right_and_can_be_fitted_again() {
 /// Counts are seen whatever else there is; that the twin explains the rest is said only where it does.
 #[test]
 fn what_counts_do_not_explain_is_said() {
-    let outcome = diagnose(&twin(), &[recorded("train", 1)], &[pulled("test", 2, 0.3)], Seed(0), &|_, _, _| {});
+    let [train, test] = [("train", 1, 0.0), ("test", 2, 0.3)].map(|(name, salt, load)| [pulled(name, salt, load, 0.7)]);
+    let outcome = diagnose(&twin(), &train, &test, Seed(0), &|_, _, _| {});
     let found = &outcome.diagnosis;
     let names: Vec<&str> = found.effects.iter().map(|effect| effect.mechanism.as_str()).collect();
     assert_eq!((found.verdict, names), (Verdict::Named, vec!["quantization"]), "{}", found.summary);
