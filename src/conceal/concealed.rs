@@ -14,8 +14,7 @@ pub struct Concealed {
     pub size: f64,
     /// Its true parameters, as far as a registry's of that name can be compared with them.
     pub parameters: BTreeMap<String, f64>,
-    /// What they are to be called in forms that lack some of them and do what these do as nearly as they can: a set of names and values
-    /// for each such form, all of its names among them.
+    /// What forms that lack some of them come closest with: for each such form all of its names, and their values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub simpler: Vec<BTreeMap<String, f64>>,
     /// When it began [s], where not from the start: of what takes a while, the middle of that.

@@ -32,9 +32,7 @@ pub(super) fn diagnosis<T: Twin>(
         verdict => verdict,
     };
     if verdict == Verdict::Unexplained {
-        let part_of_it = |sure: f64| if findings.sampled { PART_OF_IT * sure.powf(LESS_SURE) } else { sure };
-        let after_all = 1.0 - findings.remainder.clamp(0.0, 1.0);
-        effects.iter_mut().for_each(|e| e.confidence = after_all * part_of_it(e.confidence));
+        effects.iter_mut().for_each(|e| e.confidence = after_all(e.confidence, findings.remainder, findings.sampled));
     }
     let blocks = inquiry.problem(&selected.twin, &inquiry.evidence.compared).blocks();
     let mut names: Vec<&str> = inquiry.candidates.iter().map(|c| c.about.name).collect();
@@ -61,6 +59,12 @@ pub(super) fn diagnosis<T: Twin>(
         held_out: inquiry.evidence.how.clone(),
         effects,
     }
+}
+
+/// How sure a name is where something unknown is left, of signals or of messages: what is left speaks against it.
+fn after_all(sure: f64, remainder: f64, sampled: bool) -> f64 {
+    let part = if sampled { PART_OF_IT * sure.powf(LESS_SURE) } else { sure };
+    part * (1.0 - remainder.clamp(0.0, 1.0))
 }
 
 /// What the words for the verdict are made of.
@@ -217,4 +221,18 @@ fn notes<T: Twin>(inquiry: &Inquiry<'_, T>, selected: &Hypothesis<T>, findings: 
         ));
     }
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the evidence left no doubt of is right in 6 of 10 then, what it made likely in a fifth, and of messages as often as before.
+    #[test]
+    fn beside_something_unknown_names_are_less_sure_and_the_unsure_by_more() {
+        let told = [0.99, 0.5].map(|sure| after_all(sure, 0.0, true));
+        assert!((told[0] - 0.59).abs() < 0.01 && (told[1] - 0.21).abs() < 0.01, "{told:?}");
+        assert_eq!(after_all(0.5, 0.0, false), 0.5);
+        assert_eq!([0.5, 2.0].map(|left| after_all(0.8, left, false)), [0.4, 0.0]);
+    }
 }
