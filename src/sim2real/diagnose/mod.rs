@@ -37,6 +37,7 @@ mod gates;
 mod held_out;
 mod hypothesis;
 mod judged;
+mod kin;
 mod locate;
 mod nameless;
 mod needed;

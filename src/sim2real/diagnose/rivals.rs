@@ -6,19 +6,15 @@ use super::Score;
 use super::carry_over::carries_over;
 use super::confidence::{Doubts, by_evidence, calibrated};
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::kin::{OFF_BY, shows_itself, slight};
 use super::needed::{completes, share};
 use super::pursue::pursued;
 use super::screen::Screened;
 use super::screening::Screening;
 use super::selection::Selection;
-use super::weigh::{evidence, gain, lead, left_open};
+use super::weigh::{evidence, gain, lead, lead_unlike, left_open};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
-/// What a law explains more of the first misfit than a special case of it counts from this part on.
-const SLIGHT: f64 = 0.02;
-/// Unless the evidence for it is more than this, and it explains as much where it was not fitted: of laws as slight as that beside a special
-/// case that was the right one none had any (32 cases of development seeds 70 and 71); one that was right itself had 1,465.
-const NOT_SLIGHT: f64 = 200.0;
 /// Rivals that lose by more than this are none.
 pub(super) const WITHIN: f64 = 10.0;
 /// Rivals that lose by less than this in one form are tried in all.
@@ -61,10 +57,6 @@ const NO_ERROR_OF_FORM: f64 = 200.0;
 /// The same where it is so small a share that the form of the first would do to explain it: 210 was gained by a false second
 /// (51/109), 2,176 by a right one (71/122).
 const NO_FORM_AT_ALL: f64 = 1000.0;
-
-/// A law that has another form than the real thing leaves so much of the first misfit: 2 % of what it explains, squared. What is named
-/// besides explains more, where without it hardly anything is left.
-const OFF_BY: f64 = 5e-4;
 
 /// Of three, one that is less likely than this to be right, or to have the right one among its rivals, stands for what the forms of the
 /// others are off by.
@@ -274,6 +266,7 @@ fn best_forms<T: Twin>(inquiry: &Inquiry<'_, T>, others: &mut Vec<(usize, f64)>)
 ///
 /// A law that contains another as a special case must explain a share of the first misfit more than that, or all that is left
 /// of it, and be better by more than others: laws never have quite the form of the real thing, and one more constant bends anything a little nearer.
+/// Where what it says more shows itself, the evidence alone decides.
 fn loss<T: Twin>(
     inquiry: &Inquiry<'_, T>,
     first: &Hypothesis<T>,
@@ -282,6 +275,11 @@ fn loss<T: Twin>(
     (own, other): (About, About),
 ) -> f64 {
     let loss = lead(inquiry, first, selected, rival);
+    if shows_itself(inquiry, first, [rival, selected], [&other, &own])
+        || shows_itself(inquiry, first, [selected, rival], [&own, &other])
+    {
+        return lead_unlike(inquiry, first, selected, rival);
+    }
     if own.contains.contains(&other.name) && rival.free() < selected.free() {
         return if slight(inquiry, first, rival, selected) { loss.min(-1.0) } else { loss - WITHIN };
     }
@@ -303,16 +301,6 @@ fn loss<T: Twin>(
 /// What a rival with more constants loses, but for what counting those that data leave open charges it too much.
 fn listed_as(loss: f64, open: f64) -> f64 {
     (loss - open).max(LONGER).min(loss)
-}
-
-/// Whether `law` explains so little more of the first misfit than a special case of it that the form of that may be all it makes up for: of
-/// one alone of signals also where the law leaves nothing else, if that is no more than any form is off by.
-fn slight<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, special: &Hypothesis<T>, law: &Hypothesis<T>) -> bool {
-    let (sampled, explained) = (inquiry.twin.clock() != Clock::Event, share(first, special, law));
-    let beyond_form = || evidence(inquiry, first, law, special) > NOT_SLIGHT && carries_over(inquiry, special, law);
-    let off_by = sampled && special.added.len() == 1 && explained < OFF_BY;
-    let of_form = explained < SLIGHT && !completes(special, law) || off_by;
-    of_form && !(sampled && beyond_form())
 }
 
 #[cfg(test)]

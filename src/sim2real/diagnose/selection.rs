@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::Score;
 use super::free_run::strays;
 use super::hypothesis::{Hypothesis, Inquiry};
+use super::kin::shows_itself;
 use super::prune::{all_needed, pruned};
 use super::pursue::pursued;
 use super::screening::Screening;
@@ -111,18 +112,20 @@ impl<T: Twin> Selection<T> {
         let whole = pursued(inquiry, &self.recalibrated, &self.selected, less, &screened);
         let swapped = self.with_set(pruned(inquiry, &self.recalibrated, vec![whole]));
         let selected = &swapped.selected;
-        // A simpler law is preferred although it explains a little less.
-        let simpler = selected.free() < self.selected.free()
-            && self.selected.added.get(place).is_some_and(|own| {
-                let (own, other) = (inquiry.candidates[*own].about, inquiry.candidates[other].about);
-                own.contains.contains(&other.name)
-            });
+        let abouts =
+            self.selected.added.get(place).map(|own| [&inquiry.candidates[*own].about, &inquiry.candidates[other].about]);
+        // A simpler law is preferred although it explains a little less, ...
+        let simpler =
+            selected.free() < self.selected.free() && abouts.is_some_and(|[own, other]| own.contains.contains(&other.name));
+        // ... unless what a longer one says more is seen.
+        let both = [&self.selected, selected];
+        let shown = abouts.is_some_and(|abouts| shows_itself(inquiry, &swapped.recalibrated, both, abouts));
         let kept = selected.added.len() >= self.selected.added.len();
         let better = lead(inquiry, &swapped.recalibrated, selected, &self.selected) > 0.0;
         if strays(inquiry, &self.selected, selected) {
             return None;
         }
-        (better || simpler && kept).then_some(swapped)
+        (better || kept && (simpler || shown)).then_some(swapped)
     }
 
     /// This selection with another set selected: all that was tried remains known.

@@ -120,6 +120,16 @@ pub(super) fn lead<T: Twin>(inquiry: &Inquiry<'_, T>, first: &Hypothesis<T>, a: 
     said + by_own + (rested(a) - rested(b)).clamp(-FIRST_MOMENTS, FIRST_MOMENTS)
 }
 
+/// The same where both are known to say different things, however little they leave differs.
+pub(super) fn lead_unlike<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    first: &Hypothesis<T>,
+    a: &Hypothesis<T>,
+    b: &Hypothesis<T>,
+) -> f64 {
+    evidence(inquiry, first, a, b) + beforehand(inquiry, a) - beforehand(inquiry, b)
+}
+
 /// What counts of the `evidence` between two that say the same in as many constants.
 fn between_equals(evidence: f64) -> f64 {
     let size = evidence.abs();
