@@ -20,8 +20,8 @@ pub(super) const OFF_BY: f64 = 5e-4;
 /// A law shows itself where evidence of more than this speaks for it ...
 const SHOWS: f64 = 1.2 * ACCEPT;
 /// ... and the constants that make it, of which the law beside it lacks one, are each so many standard deviations from doing nothing: of 60
-/// dry frictions beside which a Stribeck friction explained a little more none had such an excess, of 14 Stribeck frictions of which
-/// little showed 6 had (ten spent test seeds).
+/// dry frictions none had both beside a Stribeck friction that explained a little more, of 14 Stribeck frictions for which there was any
+/// evidence beside a dry one 5 had (ten spent test seeds).
 const KNOWN_FROM_NOTHING: f64 = 3.5;
 
 /// Whether `law` explains so little more of the first misfit than a special case of it that the form of that may be all it makes up for: of

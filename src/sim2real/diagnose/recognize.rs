@@ -75,11 +75,21 @@ fn lost_some(samples: usize, repeated: usize, fewest: usize, runs: usize) -> boo
     repeated >= FEWEST && runs >= fewest && 2 * repeated <= samples
 }
 
-/// Whether noise moves a channel from each sample to the next, so that no two are the same.
+/// Whether noise moves a channel from each sample to the next, so that no two are the same, but where it may have come to the end of its
+/// range.
 fn restless(measured: &Measured, resolution: f64) -> bool {
-    let pairs = measured.samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
-    let (moved, noise) = (median(pairs.collect()), fourth_difference(&measured.samples));
-    noise > NOISY * moved && resolution < FINELY * noise
+    let samples = &measured.samples;
+    let pairs = samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs()));
+    let (moved, noise) = (median(pairs.collect()), fourth_difference(samples));
+    let ends = ends(samples).map(Some);
+    let held_there = samples.windows(2).any(|w| w[0] == w[1] && ends.contains(&w[0]));
+    noise > NOISY * moved && resolution < FINELY * noise && !held_there
+}
+
+/// The least and the largest of all samples.
+fn ends(samples: &[Option<f64>]) -> [f64; 2] {
+    let present = || samples.iter().flatten().copied();
+    [present().fold(f64::INFINITY, f64::min), present().fold(f64::NEG_INFINITY, f64::max)]
 }
 
 /// A run of equal samples counts as lost where fewer than this many as long are to be expected by chance ...
@@ -99,12 +109,10 @@ const COMES_BACK: usize = 4;
 /// rounding, 0 where it does not round.
 fn stale(measured: &Measured, resolution: f64) -> Vec<bool> {
     let samples = &measured.samples;
-    let present = || samples.iter().flatten().copied();
     // A sensor at the end of its range repeats itself with reason, each time it comes there: what is held once may be the highest of
     // all by chance.
-    let ends = [present().fold(f64::INFINITY, f64::min), present().fold(f64::NEG_INFINITY, f64::max)];
     let times = |end: f64| samples.chunk_by(|a, b| a == b).filter(|run| run[0] == Some(end)).count();
-    let ends = ends.map(|end| (times(end) > 1).then_some(end));
+    let ends = ends(samples).map(|end| (times(end) > 1).then_some(end));
     let repeats = |w: &[Option<f64>]| w[1].is_some() && w[0].map(f64::to_bits) == w[1].map(f64::to_bits);
     let mut stale: Vec<bool> = std::iter::once(false).chain(samples.windows(2).map(repeats)).collect();
     let step = resolution * 12.0_f64.sqrt();
@@ -294,7 +302,9 @@ mod tests {
         let noisy = |size: f64, i: usize| (0.01 * i as f64).sin() + size * noise[i];
         let shaken: Vec<Option<f64>> = (0..3_000).map(|i| Some(noisy(0.01, i))).collect();
         assert!(restless(&measured(shaken.clone()), 0.0));
-        assert!(restless(&measured(shaken.clone()), 1e-5) && !restless(&measured(shaken), 1e-3), "counted finely or not");
+        assert!(restless(&measured(shaken.clone()), 1e-5) && !restless(&measured(shaken.clone()), 1e-3), "counted or not");
+        let clipped = shaken.iter().map(|y| y.map(|y| y.min(0.9))).collect();
+        assert!(!restless(&measured(clipped), 0.0), "the end of its range");
         let still: Vec<Option<f64>> = (0..3_000).map(|i| Some(noisy(1e-5, i))).collect();
         assert!(!restless(&measured(still), 0.0), "what is simulated rests wherever nothing pulls at it");
         assert!(lost_some(3_000, 12, 1, 1) && !lost_some(3_000, 4, 1, 1));
