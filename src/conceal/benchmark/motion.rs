@@ -8,6 +8,12 @@ use super::effect::Effect;
 use super::load::{self, Instant, Load};
 use crate::sim2real::Seed;
 
+/// What changes faster than this [1/s] has run away, as friction does that is tried so strong that it drives what it should brake: steps
+/// that follow it would never end.
+const FASTEST: f64 = 1e7;
+/// Where it then is: further than whatever a strength is looked for at.
+const ASTRAY: f64 = 1e12;
+
 /// Commands of a recording, and where the arm is when it begins.
 #[derive(Debug, Clone)]
 pub(super) struct Drive {
@@ -162,7 +168,7 @@ impl Machine {
             .collect()
     }
 
-    /// Integrates over `duration` [s] under one command, in steps that what is stiff can bear.
+    /// Integrates over `duration` [s] under one command, in steps that what is stiff can bear. What runs away is nowhere near.
     fn integrate(&self, mut state: State, command: f64, mut time: f64, duration: f64, precision: Precision) -> State {
         if duration <= 0.0 {
             return state;
@@ -180,6 +186,9 @@ impl Machine {
             let rubbing = if self.load.coupling.is_some() { state.motor_velocity } else { state.velocity };
             let load = || self.load.fastest(self.arm.inertia, state.position, state.velocity, rubbing);
             let fastest = driver.max(load());
+            if fastest > FASTEST {
+                return State { position: ASTRAY, ..state };
+            }
             let step = left.min(precision.step()).min(if fastest > 0.0 { patience / fastest } else { f64::INFINITY });
             let step = if left - step < 0.1 * step { left } else { step };
             state = self.runge_kutta(state, command, time, step);
@@ -291,5 +300,17 @@ mod tests {
         };
         let moving = KNOWN.into_iter().chain(FOREIGN).filter(|id| moves(id)).count();
         assert!(moving >= 6, "{moving}: friction, hysteresis, a lag, a slewing driver, heat, a relaxing spring");
+    }
+
+    #[test]
+    fn what_runs_away_is_far_off_and_comes_to_an_end() {
+        let arm = Arm { linear: false, inertia: 0.1, viscous_friction: 0.2, gravity_torque: 2.5, gain: 1.0 };
+        let drive = Drive { commands: vec![1.0; 50], sample: 0.004, start: 0.0, speed: 0.0 };
+        let ends = |bend: f64| {
+            let friction = Effect::Bristles { sliding: 0.5, breakaway: 0.5, fading: 0.1, load: 0.0, bend };
+            Machine::new(arm, &[friction]).run(&drive, Precision::Coarse, Seed(0)).at(0.19)
+        };
+        assert!(ends(1e-3).abs() < 10.0);
+        assert!(ends(1e-18).abs() > 0.9 * ASTRAY);
     }
 }
