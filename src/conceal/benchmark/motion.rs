@@ -8,8 +8,7 @@ use super::effect::Effect;
 use super::load::{self, Instant, Load};
 use crate::sim2real::Seed;
 
-/// What changes faster than this [1/s] has run away, as friction does that is tried so strong that it drives what it should brake: steps
-/// that follow it would never end.
+/// What changes faster than this [1/s] has run away: a run in steps that follow it would not come to an end.
 const FASTEST: f64 = 1e7;
 
 /// Commands of a recording, and where the arm is when it begins.

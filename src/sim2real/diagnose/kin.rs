@@ -5,7 +5,7 @@ use super::free_run::strays;
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::needed::{completes, share};
 use super::weigh::{ACCEPT, evidence, lead_unlike};
-use super::whiteness::ChannelMisfit;
+use super::whiteness::widening;
 use crate::sim2real::{About, Clock, Parameter, Twin};
 
 /// What a law explains more of the first misfit than a special case of it counts from this part on.
@@ -68,10 +68,8 @@ fn from_nothing<T: Twin>(
     let (Some(of_shorter), Some(of_longer)) = (place(shorter, less), place(longer, more)) else { return 0.0 };
     let constants = |whole: &Hypothesis<T>, place: usize| &inquiry.candidates[whole.added[place]].form.parameters;
     let shared: Vec<&str> = constants(shorter, of_shorter).iter().map(|p| &*p.name).collect();
-    let widened = |m: &ChannelMisfit| (m.sum_of_squares / m.count.max(1) as f64).max(1.0) * m.autocorrelation_time.max(1.0);
-    let factor = longer.misfits.iter().map(widened).fold(1.0, f64::max).sqrt();
     let (own, fit) = (inquiry.of_mechanism(longer, of_longer), &longer.fit);
-    nearest(constants(longer, of_longer), &fit.values[own.clone()], &fit.std[own], &shared) / factor
+    nearest(constants(longer, of_longer), &fit.values[own.clone()], &fit.std[own], &shared) / widening(&longer.misfits)
 }
 
 /// How many standard deviations the constants of a `law` that do nothing at 0 are from there, that of them which is nearest; 0 where all

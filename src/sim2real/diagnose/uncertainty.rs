@@ -16,11 +16,8 @@ const BEYOND_NOISE: f64 = 2.0;
 pub(super) fn inflated<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>, fit: &Fit) -> Vec<f64> {
     let parts = if inquiry.evidence.window.is_some() { &inquiry.evidence.free_run } else { &inquiry.evidence.compared };
     let blocks = inquiry.problem(&hypothesis.twin, parts).blocks();
-    let factor = whiteness::channel_misfits(fit.residual.as_slice(), &blocks, |c| inquiry.evidence.rounding_of(c))
-        .iter()
-        .map(|m| (m.sum_of_squares / m.count.max(1) as f64).max(1.0) * m.autocorrelation_time.max(1.0))
-        .fold(1.0, f64::max)
-        .sqrt();
+    let left = whiteness::channel_misfits(fit.residual.as_slice(), &blocks, |c| inquiry.evidence.rounding_of(c));
+    let factor = whiteness::widening(&left);
     let parameters = hypothesis.twin.parameters();
     let by_a_rule = exact::by_a_rule(inquiry, hypothesis, fit);
     let values: Vec<f64> = parameters.iter().zip(&fit.values).map(|(p, v)| p.shown.map_or(*v, |[value, _]| value)).collect();

@@ -47,6 +47,12 @@ impl ChannelMisfit {
     }
 }
 
+/// By how much standard deviations are larger than white noise of the noise floor's size makes them: misfit and autocorrelation widen them.
+pub(super) fn widening(misfits: &[ChannelMisfit]) -> f64 {
+    let one = |m: &ChannelMisfit| (m.sum_of_squares / m.count.max(1) as f64).max(1.0) * m.autocorrelation_time.max(1.0);
+    misfits.iter().map(one).fold(1.0, f64::max).sqrt()
+}
+
 /// The misfit of every channel; `rounding` gives the variance of a channel's rounding, in units of its noise.
 ///
 /// Rounding is white, and it is there however well a model does: residuals far below it, which may all be the same in the
