@@ -194,11 +194,16 @@ impl Set {
         dosed.iter().map(|(recipe, strength)| recipe.at(*strength, &self.scales)).collect()
     }
 
-    /// The recording to learn from, as coarsely integrated as a search can afford.
-    fn rehearsed(&self, effects: &[Effect], noise: &[f64]) -> (Vec<f64>, Motion) {
+    /// The recording to learn from, as coarsely integrated as a search can afford, in which the size of what is called `id` shows.
+    ///
+    /// Unless that is the counting itself, before a sensor counts: where a small change moves a few readings by a whole step and all others
+    /// by nothing, its root mean square is that of the step and not of what changed.
+    fn rehearsed(&self, effects: &[Effect], noise: &[f64], id: &str) -> (Vec<f64>, Motion) {
         let seed = self.seed.child(RECORDINGS[0]);
         let motion = Machine::new(self.arm, effects).run(&self.drives[0], Precision::Coarse, seed);
-        (self.sensor(effects, 0).measure(&motion, &self.drives[0], noise), motion)
+        let sensor = self.sensor(effects, 0);
+        let sensor = if id == "quantization" { sensor } else { sensor.uncounted() };
+        (sensor.measure(&motion, &self.drives[0], noise), motion)
     }
 
     fn noise_of(&self, recording: usize) -> Vec<f64> {
@@ -216,10 +221,10 @@ impl Set {
                 continue;
             }
             let before = self.effects(&dosed);
-            let (without, still) = self.rehearsed(&before, &noise);
+            let (without, still) = self.rehearsed(&before, &noise, recipe.id);
             let size = |strength: f64| {
                 let all = [before.clone(), vec![recipe.at(strength, &self.scales)]].concat();
-                let (with, motion) = self.rehearsed(&all, &noise);
+                let (with, motion) = self.rehearsed(&all, &noise, recipe.id);
                 let size = hideable.size(&with, &without, self.sigma());
                 if motion.reach() > RUNAWAY * still.reach() { f64::INFINITY } else { size }
             };
@@ -251,17 +256,13 @@ impl Set {
         Refit { arm: self.arm, effects: &others, drive: &self.drives[0], seed, scales }.hides(&all, hideable)
     }
 
-    /// What is rehearsed of all effects but number `k`.
-    fn beside(&self, dosed: &[Dosed], k: usize, noise: &[f64]) -> (Vec<f64>, Motion) {
-        let others = dosed.iter().enumerate().filter(|(other, _)| *other != k);
-        let others: Vec<Dosed> = others.map(|(_, dosed)| dosed.clone()).collect();
-        self.rehearsed(&self.effects(&others), noise)
-    }
-
     /// The size of each effect beside the others.
     fn sizes(&self, dosed: &[Dosed], noise: &[f64], hideable: &Hideable) -> Vec<f64> {
-        let (with, _) = self.rehearsed(&self.effects(dosed), noise);
-        let size = |k: usize| hideable.size(&with, &self.beside(dosed, k, noise).0, self.sigma());
+        let size = |k: usize| {
+            let rows = |dosed: &[Dosed], id: &str| self.rehearsed(&self.effects(dosed), noise, id).0;
+            let (id, others) = (dosed[k].0.id, [&dosed[..k], &dosed[k + 1..]].concat());
+            hideable.size(&rows(dosed, id), &rows(&others, id), self.sigma())
+        };
         (0..dosed.len()).map(size).collect()
     }
 
@@ -412,6 +413,30 @@ mod tests {
                 hits += 1;
             }
             assert!(hits > 0, "{id} was never to be had");
+        }
+    }
+
+    /// What is concealed beside a sensor that counts in coarse steps is as large as it is without one, and not as what it moves by a step.
+    #[test]
+    fn steps_make_nothing_out_larger_than_it_is() {
+        for ids in [["quantization", "quadratic_drag"], ["quadratic_drag", "quantization"]] {
+            let plan = Plan { kind: Kind::Pair, ids: ids.to_vec() };
+            let targets = ids.map(|id| if id == "quantization" { 12.0 } else { 3.0 });
+            let found = (0..6).find_map(|attempt| {
+                let set = Set::draw(&plan, Seed(attempt));
+                set.concealing(&plan, &targets).ok().map(|dosage| (set, dosage))
+            });
+            let (set, Dosage { dosed, sizes }) = found.unwrap();
+            let drag = ids.iter().position(|id| *id == "quadratic_drag").unwrap();
+            assert!((sizes[drag] / 3.0 - 1.0).abs() < 0.06 && (sizes[1 - drag] / 12.0 - 1.0).abs() < 0.1, "{sizes:?}");
+            let (noise, hideable) = (set.noise_of(0), set.hideable());
+            let size = |dosed: &[Dosed], without: &[Dosed], id: &str| {
+                let rows = |dosed: &[Dosed]| set.rehearsed(&set.effects(dosed), &noise, id).0;
+                hideable.size(&rows(dosed), &rows(without), set.sigma())
+            };
+            assert!((size(&dosed[drag..=drag], &[], "quadratic_drag") / 3.0 - 1.0).abs() < 0.06);
+            let others = &dosed[1 - drag..2 - drag];
+            assert!(size(&dosed, others, "quantization") > 1.5 * sizes[drag], "steps would tell the size of a step");
         }
     }
 }

@@ -77,6 +77,15 @@ impl Sensor {
         Self { effects: effects.to_vec(), bursts, noise, kind }
     }
 
+    /// The same without counting.
+    pub fn uncounted(mut self) -> Self {
+        self.effects.retain(|effect| !matches!(effect, Effect::Counts { .. }));
+        if matches!(self.kind, Noise::Counted(_)) {
+            self.kind = Noise::White;
+        }
+        self
+    }
+
     /// What is recorded of `motion`, with a noise of standard deviation 1 given.
     pub fn measure(&self, motion: &Motion, drive: &Drive, noise: &[f64]) -> Vec<f64> {
         let mut counted = None;

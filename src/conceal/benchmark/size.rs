@@ -75,7 +75,9 @@ fn norm(vector: &[f64]) -> f64 {
 ///
 /// Bisection in the logarithm of the strength, sped up by the secant: most effects are nearly proportional to theirs.
 pub(super) fn strength(target: f64, range: (f64, f64), size: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
-    let error = |strength: f64| (size(strength).max(1e-12) / target).ln();
+    // What has no size is too strong: something flew apart.
+    let sized = |strength: f64| Some(size(strength)).filter(|size| !size.is_nan()).unwrap_or(f64::INFINITY);
+    let error = |strength: f64| (sized(strength).max(1e-12) / target).ln();
     let (mut low, mut high) = (range.0.ln(), range.1.ln());
     let (mut below, mut above): (Option<f64>, Option<f64>) = (None, None);
     let mut at = 0.5 * (low + high);
@@ -123,6 +125,8 @@ mod tests {
         assert_eq!(strength(3.0, (1e-4, 0.01), |s| 40.0 * s), None);
         assert_eq!(strength(3.0, (1.0, 2.0), |s| 40.0 * s), None);
         assert!(strength(3.0, (1e-4, 2.0), |s| if s > 0.3 { f64::NAN } else { 40.0 * s }).is_some());
+        // The first that is tried has none: the search goes down from there, not up.
+        assert!(strength(3.0, (1e-4, 1e3), |s| if s > 0.1 { f64::NAN } else { 40.0 * s }).is_some());
     }
 
     /// A change that a heavier arm would make is no effect; one that is at right angles to all refitting is seen whole.
