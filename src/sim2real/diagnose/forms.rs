@@ -69,7 +69,7 @@ pub(super) fn in_best_forms<T: Twin>(
 }
 
 /// The names of the mechanisms of `hypothesis`, the same for the same set.
-fn names<'c, T: Twin>(inquiry: &Inquiry<'c, T>, hypothesis: &Hypothesis<T>) -> Vec<&'c str> {
+pub(super) fn names<'c, T: Twin>(inquiry: &Inquiry<'c, T>, hypothesis: &Hypothesis<T>) -> Vec<&'c str> {
     let mut names: Vec<&str> = hypothesis.added.iter().map(|number| inquiry.candidates[*number].about.name).collect();
     names.sort_unstable();
     names

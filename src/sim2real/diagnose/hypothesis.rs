@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::evidence::Evidence;
 use super::screen::{Screened, signatures};
-use super::weigh::squares;
+use super::weigh::{squares, strained};
 use super::whiteness::{ChannelMisfit, channel_misfits};
 use crate::sim2real::identify::{Block, Effort, Fit, Problem, State, fit};
 use crate::sim2real::{Candidate, Parameter, Part, Seed, Twin};
@@ -122,7 +122,8 @@ impl<T: Twin> Inquiry<'_, T> {
     /// `less`, which is `whole` without one of its mechanisms, with what was `screened` in its place.
     ///
     /// `less` was refitted without that mechanism, and may have been bent so far that no fit finds back from there: it is begun
-    /// from where `whole` stands, too.
+    /// from where `whole` stands, too. What `whole` has dragged the twin's own parameters to is no place to begin at: then from where they
+    /// are given as well.
     pub fn instead(
         &self,
         whole: &Hypothesis<T>,
@@ -132,7 +133,14 @@ impl<T: Twin> Inquiry<'_, T> {
     ) -> Hypothesis<T> {
         let twin = less.twin.with(&self.candidates[screened.number]);
         let mut starts = apart(&screened.starts, twin.parameters(), STARTS);
-        starts.extend(self.in_place(whole, less, screened));
+        if let Some(in_place) = self.in_place(whole, less, screened) {
+            if strained(self, whole) {
+                let given: Vec<Vec<f64>> =
+                    screened.starts.iter().map(|start| self.as_given(&in_place, start, screened)).collect();
+                starts.extend(apart(&given, twin.parameters(), STARTS));
+            }
+            starts.push(in_place);
+        }
         let added = less.added.iter().copied().chain([screened.number]).collect();
         self.boldly_or_timidly(twin, added, &starts, less, screened, effort)
     }
@@ -171,6 +179,14 @@ impl<T: Twin> Inquiry<'_, T> {
             }
         }
         Some(values)
+    }
+
+    /// `values`, with the twin's own as they are given, and those of what was `screened`, which stand last, as in `start`.
+    fn as_given(&self, values: &[f64], start: &[f64], screened: &Screened) -> Vec<f64> {
+        let (own, last) = (self.twin.parameters(), self.candidates[screened.number].form.parameters.len());
+        let given = own.iter().map(|parameter| parameter.nominal);
+        let others = values[own.len()..values.len() - last].iter().copied();
+        given.chain(others).chain(start[start.len() - last..].iter().copied()).collect()
     }
 
     /// `whole` without the `position`-th of its mechanisms, refitted from the joint solution and from the twin as given.

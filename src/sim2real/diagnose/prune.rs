@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::forms::reformed;
+use super::forms::{names, reformed};
 use super::hypothesis::{Hypothesis, Inquiry};
 use super::needed::needed;
 use super::weigh::{ACCEPT, gain, lead, ranked, squares};
@@ -12,6 +12,8 @@ use crate::sim2real::Twin;
 const AS_LITTLE: f64 = 1e-4;
 /// Of so many mechanisms, one may stand for what the others leave in the wrong form.
 const SEVERAL: usize = 3;
+/// So many other sets that are as good as the best of the last stage are pruned as well.
+const AS_GOOD: usize = 2;
 
 /// Leaves out of the largest set what it does not need, one mechanism at a time, refitting each time. Gives the twin with
 /// nothing added too: its refit may have been better begun from where that of the set ended.
@@ -57,6 +59,44 @@ pub(super) fn pruned<T: Twin>(
             _ => smaller,
         };
     }
+}
+
+/// Sets as large as may be that are as good as the `best` of them, for all that so few points of evidence say, no two of the same names.
+///
+/// Which of them is best is hardly told, and what the one needs and the others do not may be the right set.
+pub(super) fn others_as_good<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    parent: &Hypothesis<T>,
+    best: &Hypothesis<T>,
+    children: &[Hypothesis<T>],
+) -> Vec<Hypothesis<T>> {
+    let near = |child: &&Hypothesis<T>| lead(inquiry, parent, best, child) <= ACCEPT;
+    let mut known = vec![names(inquiry, best)];
+    let mut kept = Vec::new();
+    for child in children.iter().filter(near) {
+        let names = names(inquiry, child);
+        if kept.len() < AS_GOOD && !known.contains(&names) {
+            known.push(names);
+            kept.push(child.clone());
+        }
+    }
+    kept
+}
+
+/// What is needed of the largest of `best_of_stage`, or of one of those that are `as_good`, if that comes to more.
+pub(super) fn best_part<T: Twin>(
+    inquiry: &Inquiry<'_, T>,
+    recalibrated: &Hypothesis<T>,
+    best_of_stage: Vec<Hypothesis<T>>,
+    as_good: Vec<Hypothesis<T>>,
+) -> (Hypothesis<T>, Hypothesis<T>, Vec<Hypothesis<T>>) {
+    let smaller = best_of_stage.split_last().map_or_else(Vec::new, |(_, smaller)| smaller.to_vec());
+    let of_others = as_good.into_par_iter().map(|other| [smaller.clone(), vec![other]].concat());
+    let paths: Vec<Vec<Hypothesis<T>>> = [best_of_stage].into_par_iter().chain(of_others).collect();
+    let all: Vec<_> = paths.into_par_iter().map(|path| pruned(inquiry, recalibrated, path)).collect();
+    let mut all = all.into_iter();
+    let first = all.next().unwrap_or_else(|| (recalibrated.clone(), recalibrated.clone(), Vec::new()));
+    all.fold(first, |best, other| if lead(inquiry, &best.0, &best.1, &other.1) < 0.0 { other } else { best })
 }
 
 /// Whether each mechanism of `whole` is needed, which leaves less than what is fitted `without` it.

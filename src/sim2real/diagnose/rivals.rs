@@ -12,7 +12,7 @@ use super::pursue::pursued;
 use super::screen::Screened;
 use super::screening::Screening;
 use super::selection::Selection;
-use super::weigh::{evidence, gain, lead, lead_unlike, left_open};
+use super::weigh::{evidence, gain, lead, lead_unlike, left_open, strained};
 use crate::sim2real::{About, Candidate, Clock, Twin};
 
 /// Rivals that lose by more than this are none.
@@ -168,9 +168,11 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
                 };
                 tried.par_iter().map(one).collect()
             };
-            let simpler = selection.complete() && inquiry.at_a_bound(selected, place);
-            let mut others = losses(likely(inquiry, selection, &screened, *own, simpler));
-            others.extend(losses(further_forms(inquiry, &screened, &others, *own, selected.leaves_nothing())));
+            let strained = strained(inquiry, selected);
+            let any_of_site = strained || selection.complete() && inquiry.at_a_bound(selected, place);
+            let mut others = losses(likely(inquiry, selection, &screened, *own, any_of_site));
+            let kin_too = !selected.leaves_nothing();
+            others.extend(losses(further_forms(inquiry, &screened, &others, *own, kin_too, strained)));
             best_forms(inquiry, &mut others);
             let nearest = others.iter().map(|(_, loss)| *loss).filter(|loss| loss.is_finite()).min_by(f64::total_cmp);
             Place { gain: whole, nearest, others: others.into_iter().filter(|(_, loss)| *loss < WITHIN).collect() }
@@ -180,17 +182,18 @@ fn rivals<T: Twin>(inquiry: &Inquiry<'_, T>, selection: &Selection<T>) -> Vec<Pl
 
 /// The mechanisms that may be rivals of candidate `own` among what was screened, each in the form that looks best: the likeliest, and
 /// those of which one is a special case of the other, whatever screening, which sees how they begin, says of them. A law of which a
-/// constant ended at a bound is a `simpler` one there, and may be that of any name of its site.
+/// constant ended at a bound is a simpler one there, and may be that of any name of its site; so may what drags the twin's own parameters
+/// where they can hardly be.
 fn likely<'s, T: Twin>(
     inquiry: &Inquiry<'_, T>,
     selection: &Selection<T>,
     screened: &'s [Screened],
     own: usize,
-    simpler: bool,
+    any_of_site: bool,
 ) -> Vec<&'s Screened> {
     let kin = |one: &Screened| {
         let (own, other) = (inquiry.candidates[own].about, inquiry.candidates[one.number].about);
-        own.contains.contains(&other.name) || other.contains.contains(&own.name) || simpler && own.site == other.site
+        own.contains.contains(&other.name) || other.contains.contains(&own.name) || any_of_site && own.site == other.site
     };
     let name = |one: &Screened| inquiry.candidates[one.number].about.name;
     let own_name = inquiry.candidates[own].about.name;
@@ -232,20 +235,23 @@ fn best_stage(scores: &[Score], name: &str) -> Option<usize> {
 
 /// The forms not tried yet of the rivals that come near, and of the special cases of candidate `own`: one of these is as good as that law
 /// where it is all that shows of it, and the form that screening likes best may lead nowhere. The same of the laws that `own` is a special
-/// case of, unless that leaves nothing for them to explain.
+/// case of, if that leaves something for `kin_too` to explain, and of all of its site beside a `strained` twin.
 fn further_forms<'s, T: Twin>(
     inquiry: &Inquiry<'_, T>,
     screened: &'s [Screened],
     tried: &[(usize, f64)],
     own: usize,
-    leaves_nothing: bool,
+    kin_too: bool,
+    strained: bool,
 ) -> Vec<&'s Screened> {
     let name = |number: usize| inquiry.candidates[number].about.name;
     let near = |one: &Screened| tried.iter().any(|(other, loss)| *loss < NEAR && name(*other) == name(one.number));
     let contains = |law: usize, other: usize| inquiry.candidates[law].about.contains.contains(&name(other));
-    let kin = |one: &Screened| contains(own, one.number) || !leaves_nothing && contains(one.number, own);
+    let kin = |one: &Screened| contains(own, one.number) || kin_too && contains(one.number, own);
     let untried = |one: &Screened| !tried.iter().any(|(other, _)| *other == one.number);
-    screened.iter().filter(|one| (near(one) || kin(one)) && untried(one)).collect()
+    let of_site =
+        |one: &Screened| strained && inquiry.candidates[own].about.site == inquiry.candidates[one.number].about.site;
+    screened.iter().filter(|one| (near(one) || kin(one) || of_site(one)) && untried(one)).collect()
 }
 
 /// Leaves each mechanism in the form that loses least.

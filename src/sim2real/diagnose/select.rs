@@ -7,7 +7,7 @@ use super::free_run::steadiest_first;
 use super::hypothesis::{Hypothesis, Inquiry, STARTS};
 use super::needed::needed_share;
 use super::order::in_either_order;
-use super::prune::pruned;
+use super::prune::{best_part, others_as_good};
 use super::screen::Screened;
 use super::screening::Screening;
 use super::selection::Selection;
@@ -90,6 +90,7 @@ fn selected_from<T: Twin>(
     });
     let mut beam = vec![start.clone().unwrap_or_else(|| recalibrated.clone())];
     let mut best_of_stage: Vec<Hypothesis<T>> = start.into_iter().collect();
+    let mut as_good: Vec<Hypothesis<T>> = Vec::new();
     for stage in first_stage..STAGES {
         progress("comparing mechanisms", stage, STAGES);
         let (mut children, tried) = expand(inquiry, &recalibrated, &beam, stage, screening.as_ref());
@@ -108,13 +109,16 @@ fn selected_from<T: Twin>(
         let promising = gain(inquiry, parent, &best) > ACCEPT
             || stage == 0 && best.leaves_something()
             || squares(&best) * BY_FAR < squares(parent);
+        if promising && stage + 1 == STAGES {
+            as_good = others_as_good(inquiry, parent, &best, &children);
+        }
         best_of_stage.push(best);
         if !promising {
             break;
         }
         beam = built_on(inquiry, &recalibrated, &beam[0], children);
     }
-    let (recalibrated, selected, without) = pruned(inquiry, &recalibrated, best_of_stage);
+    let (recalibrated, selected, without) = best_part(inquiry, &recalibrated, best_of_stage, as_good);
     Selection { recalibrated, selected, without, fitted, scores, screening }
 }
 

@@ -30,6 +30,8 @@ const SELDOM: f64 = 2.0;
 const FIRST_MOMENTS: f64 = 6.0;
 /// Degrees of freedom of what a twin says of its parameters' uncertainty.
 const FREEDOM: f64 = 4.0;
+/// What is lost in twice the logarithm of how plausible the twin's own parameters are, where one is nine standard deviations off.
+const IMPLAUSIBLE: f64 = 15.0;
 /// Numbers of effective residuals whose ratio is smaller than this differ by their own scatter.
 const AS_WHITE: f64 = 1.25;
 /// Where residuals are so correlated that few are effective, that number is known to a standard deviation of this over its root, for
@@ -189,6 +191,12 @@ pub(super) fn plausibility<T: Twin>(inquiry: &Inquiry<'_, T>, values: &[f64]) ->
     let distances =
         parameters.filter_map(|(p, value)| p.prior.filter(|std| *std > 0.0).map(|std| (value - p.nominal) / std));
     distances.map(|z| -(FREEDOM + 1.0) * (z * z / FREEDOM).ln_1p()).sum()
+}
+
+/// Whether `hypothesis` explains what was recorded by parameters of the twin's own that what the twin says of them makes implausible: then
+/// it may stand for another that leaves them where they are.
+pub(super) fn strained<T: Twin>(inquiry: &Inquiry<'_, T>, hypothesis: &Hypothesis<T>) -> bool {
+    hypothesis.within(ABOVE_NOISE) && plausibility(inquiry, &hypothesis.fit.values) < -IMPLAUSIBLE
 }
 
 /// Sum of squared residuals of all channels.
