@@ -49,7 +49,8 @@ impl Domain {
                 generator: "The generator shares no code with the plants, states each effect in another form, and integrates at \
                             0.1 ms or finer.",
                 sizes: "An effect's size is what it changes in the recording beyond what refitting inertia, friction, gravity \
-                        and initial state could hide, over the noise. Cases in which such refitting hides most of an effect after \
+                        and initial state could hide, over the noise, and, unless it is the counting itself, before a sensor counts. \
+                        Cases in which such refitting hides most of an effect after \
                         all, or in which next to nothing decides how the arm moves on, so that an effect of no size would move it far, \
                         are drawn again.",
                 misled: "something named where nothing is missing: coloured noise, rounding, a coarse integrator",

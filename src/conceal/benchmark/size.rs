@@ -1,4 +1,4 @@
-//! How large an effect is: what it changes in a recording beyond what refitting the arm would hide.
+//! How large an effect is: what it changes in a recording, before a sensor counts, beyond what refitting the arm would hide.
 
 use super::arm::Arm;
 use super::motion::{Drive, Machine, Precision};
