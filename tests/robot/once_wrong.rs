@@ -385,8 +385,8 @@ fn what_makes_a_twin_implausible_stands_for_what_does_not() {
     assert_eq!(names(&tried(1032, 713)), ["bias", "cubic_stiffness"]);
 }
 
-/// A spring and a change of payload, of which a spring that never yields about where it began took the place: beside both of these another
-/// set of three stood first by a hair, and the spring was no part of it.
+/// A spring and a change of payload: hysteresis that never yields took the spring's place, and of the sets of three that had it the one that
+/// stood first by a hair had no such spring.
 #[test]
 #[ignore = "takes a quarter of a minute: `./x test --test robot -- --ignored`"]
 fn what_is_left_of_sets_that_are_as_good_is_asked_of_each() {
